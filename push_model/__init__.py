@@ -1,0 +1,62 @@
+"""Mechanics of planar pushing: SE(2), shapes, friction, limit surfaces, stable pushes, kinematics.
+
+Pure numpy; imports nothing else of the project. SI units, radians, REP-103 axes.
+"""
+
+from push_model import se2
+from push_model.coulomb import cone_angle, cone_edges, in_cone
+from push_model.grasp import grasp_matrix, line_contact_grasp
+from push_model.kinematics import DifferentialDrive, point_velocity_to_twist, unicycle_step
+from push_model.limit_surface import (
+    EllipsoidLimitSurface,
+    LimitSurface,
+    PressureLimitSurface,
+    uniform_pressure_radius,
+)
+from push_model.settings import SettingsError, from_mapping
+from push_model.shapes import Shape, Side, ellipse, flower, polygon, rectangle, shape_from_mapping
+from push_model.stable_push import (
+    CurvatureLimits,
+    PusherContact,
+    contact_on_side,
+    curvature_limits,
+    lynch_mason_stable,
+    shifted_limits,
+)
+from push_model.trajectory import Trajectory, along_curve, concatenate, line, rotation
+
+__all__ = [
+    "CurvatureLimits",
+    "DifferentialDrive",
+    "EllipsoidLimitSurface",
+    "LimitSurface",
+    "PressureLimitSurface",
+    "PusherContact",
+    "SettingsError",
+    "Shape",
+    "Side",
+    "Trajectory",
+    "along_curve",
+    "concatenate",
+    "cone_angle",
+    "cone_edges",
+    "contact_on_side",
+    "curvature_limits",
+    "ellipse",
+    "flower",
+    "from_mapping",
+    "grasp_matrix",
+    "in_cone",
+    "line",
+    "line_contact_grasp",
+    "lynch_mason_stable",
+    "point_velocity_to_twist",
+    "polygon",
+    "rectangle",
+    "rotation",
+    "se2",
+    "shape_from_mapping",
+    "shifted_limits",
+    "uniform_pressure_radius",
+    "unicycle_step",
+]

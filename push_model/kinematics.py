@@ -1,0 +1,80 @@
+"""Kinematics of wheeled robots: unicycle (2.12), differential drive, input/output linearisation."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_model.arrays import Array
+from push_model.se2 import wrap
+
+
+@dataclass(frozen=True)
+class DifferentialDrive:
+    """Two driven wheels on one axle.
+
+    wheel_radius: [m].
+    half_track: [m] l, half the distance between the wheels.
+    max_wheel_speed: [rad/s].
+    """
+
+    wheel_radius: float
+    half_track: float
+    max_wheel_speed: float
+
+    @property
+    def max_speed(self) -> float:
+        """[m/s] straight ahead."""
+        return self.wheel_radius * self.max_wheel_speed
+
+    @property
+    def max_turn_rate(self) -> float:
+        """[rad/s] on the spot."""
+        return self.max_speed / self.half_track
+
+    def wheel_speeds(self, v: float, omega: float) -> tuple[float, float]:
+        """Left and right wheel speeds [rad/s] of a twist."""
+        return (
+            (v - omega * self.half_track) / self.wheel_radius,
+            (v + omega * self.half_track) / self.wheel_radius,
+        )
+
+    def twist(self, left: float, right: float) -> tuple[float, float]:
+        """(v, omega) of wheel speeds [rad/s]."""
+        return (
+            (left + right) * self.wheel_radius / 2.0,
+            (right - left) * self.wheel_radius / (2.0 * self.half_track),
+        )
+
+    def saturate(self, v: float, omega: float) -> tuple[float, float]:
+        """The nearest feasible twist of the same curvature: both scaled by one factor."""
+        need = (abs(v) + abs(omega) * self.half_track) / self.max_speed
+        return (v, omega) if need <= 1.0 else (v / need, omega / need)
+
+
+def unicycle_step(state: Array, v: float, omega: float, dt: float) -> Array:
+    """Exact motion of a unicycle pose ``(3,)`` under a constant twist for dt [s]."""
+    x, y, theta = state
+    half = 0.5 * omega * dt
+    chord = v * dt * (math.sin(half) / half if abs(half) > 1e-9 else 1.0)
+    return np.array(
+        [x + chord * math.cos(theta + half), y + chord * math.sin(theta + half),
+         wrap(theta + omega * dt)]
+    )
+
+
+def point_velocity_to_twist(velocity: Array, theta: float, offset: float) -> tuple[float, float]:
+    """Input/output linearisation: the twist that gives a point ahead of the axle a velocity.
+
+    Parameters
+    ----------
+    velocity: ``(2,)`` [m/s] of the point, world frame.
+    theta: [rad] heading.
+    offset: [m] of the point ahead of the axle, not zero.
+    """
+    if offset == 0.0:
+        raise ValueError("the controlled point must not lie on the axle (offset = 0)")
+    c, s = math.cos(theta), math.sin(theta)
+    along = c * velocity[0] + s * velocity[1]
+    across = -s * velocity[0] + c * velocity[1]
+    return float(along), float(across / offset)

@@ -1,0 +1,139 @@
+"""Time-parametrised references for a robot's axle midpoint."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_model.arrays import Array
+from push_model.kinematics import DifferentialDrive
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Samples of a reference.
+
+    time: ``(n,)`` [s], from 0, strictly increasing, n >= 2.
+    pose: ``(n, 3)`` [m, m, rad], world frame; the heading is continuous, not wrapped.
+    twist: ``(n, 2)`` [m/s, rad/s].
+    """
+
+    time: Array
+    pose: Array
+    twist: Array
+
+    def __post_init__(self) -> None:
+        n = len(self.time)
+        if n < 2 or self.pose.shape != (n, 3) or self.twist.shape != (n, 2):
+            raise ValueError("a trajectory needs at least two samples of equal number")
+        if not all(np.isfinite(a).all() for a in (self.time, self.pose, self.twist)):
+            raise ValueError("a trajectory must be finite")
+        if self.time[0] != 0.0 or not (np.diff(self.time) > 0.0).all():
+            raise ValueError("a trajectory's time must start at 0 and increase strictly")
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return float(self.time[-1])
+
+    def sample(self, t: Array) -> tuple[Array, Array]:
+        """Poses ``(m, 3)`` and twists ``(m, 2)`` at times ``(m,)``; at rest beyond the ends."""
+        index = np.searchsorted(self.time, t, side="right") - 1
+        index = np.clip(index, 0, len(self.time) - 2)
+        span = self.time[index + 1] - self.time[index]
+        w = np.clip((t - self.time[index]) / span, 0.0, 1.0)[:, None]
+        pose = (1.0 - w) * self.pose[index] + w * self.pose[index + 1]
+        twist = (1.0 - w) * self.twist[index] + w * self.twist[index + 1]
+        twist[(t < 0.0) | (t > self.duration)] = 0.0
+        return pose, twist
+
+
+def _ramp(distance: float, top: float, acceleration: float, step: float) -> tuple[Array, Array]:
+    """Travelled way and speed (n,) of a trapezoidal rest-to-rest motion sampled every step [s]."""
+    peak = min(top, math.sqrt(distance * acceleration))
+    rise = peak / acceleration
+    cruise = max(0.0, distance / peak - rise)
+    total = 2.0 * rise + cruise
+    t = np.linspace(0.0, total, max(3, math.ceil(total / step) + 1))
+    back = total - t
+    way = np.where(
+        t < rise,
+        0.5 * acceleration * t**2,
+        np.where(
+            back < rise,
+            distance - 0.5 * acceleration * back**2,
+            0.5 * peak * rise + peak * (t - rise),
+        ),
+    )
+    speed = np.clip(np.minimum(t, back) * acceleration, 0.0, peak)
+    return np.column_stack([t, way]), speed
+
+
+def line(
+    start: Array, distance: float, speed: float, acceleration: float, step: float = 0.05
+) -> Trajectory:
+    """Straight ahead from a pose ``(3,)``; backwards for a negative distance [m]."""
+    way, rate = _ramp(max(abs(distance), 1e-6), speed, acceleration, step)
+    sign = math.copysign(1.0, distance)
+    pose = np.column_stack(
+        [
+            start[0] + sign * way[:, 1] * math.cos(start[2]),
+            start[1] + sign * way[:, 1] * math.sin(start[2]),
+            np.full(len(way), start[2]),
+        ]
+    )
+    return Trajectory(way[:, 0], pose, np.column_stack([sign * rate, np.zeros(len(rate))]))
+
+
+def rotation(
+    start: Array, angle: float, turn_rate: float, acceleration: float, step: float = 0.05
+) -> Trajectory:
+    """On the spot from a pose ``(3,)`` by an angle [rad]."""
+    way, rate = _ramp(max(abs(angle), 1e-6), turn_rate, acceleration, step)
+    sign = math.copysign(1.0, angle)
+    pose = np.column_stack(
+        [np.full(len(way), start[0]), np.full(len(way), start[1]), start[2] + sign * way[:, 1]]
+    )
+    return Trajectory(way[:, 0], pose, np.column_stack([np.zeros(len(rate)), sign * rate]))
+
+
+def along_curve(
+    points: Array, heading: Array, curvature: Array, drive: DifferentialDrive,
+    speed: float, acceleration: float,
+) -> Trajectory:
+    """Rest to rest along a smooth curve, as fast as the wheels and the limits allow.
+
+    Parameters
+    ----------
+    points: ``(n, 2)`` [m] of the curve.
+    heading: ``(n,)`` [rad] tangent.
+    curvature: ``(n,)`` [1/m].
+    drive: whose wheel speed bounds |v| (1 + half_track |kappa|).
+    speed, acceleration: [m/s], [m/s^2] of the axle midpoint.
+    """
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    if way[-1] <= 0.0:
+        raise ValueError("a curve needs a length")
+    top = np.minimum(speed, drive.max_speed / (1.0 + drive.half_track * np.abs(curvature)))
+    v = top.copy()
+    v[0] = v[-1] = 0.0
+    for i in range(1, len(v)):
+        v[i] = min(v[i], math.sqrt(v[i - 1] ** 2 + 2.0 * acceleration * (way[i] - way[i - 1])))
+    for i in range(len(v) - 2, -1, -1):
+        v[i] = min(v[i], math.sqrt(v[i + 1] ** 2 + 2.0 * acceleration * (way[i + 1] - way[i])))
+    pace = np.maximum(0.5 * (v[1:] + v[:-1]), 1e-6)
+    time = np.concatenate([[0.0], np.cumsum(np.maximum(np.diff(way), 1e-9) / pace)])
+    pose = np.column_stack([points, np.unwrap(heading)])
+    return Trajectory(time, pose, np.column_stack([v, v * curvature]))
+
+
+def concatenate(parts: Sequence[Trajectory]) -> Trajectory:
+    """One trajectory after the other; each part starts where and how the one before ends."""
+    time, pose, twist = [parts[0].time], [parts[0].pose], [parts[0].twist]
+    for part in parts[1:]:
+        turns = round((pose[-1][-1, 2] - part.pose[0, 2]) / (2.0 * math.pi))
+        time.append(part.time[1:] + time[-1][-1])
+        pose.append(part.pose[1:] + np.array([0.0, 0.0, 2.0 * math.pi * turns]))
+        twist.append(part.twist[1:])
+    return Trajectory(np.concatenate(time), np.vstack(pose), np.vstack(twist))
