@@ -1,0 +1,38 @@
+"""Two-layer planning of pushes (sections 2.2.1-2.2.3), and of the robot's way between them."""
+
+from push_planner.distance_field import DistanceField
+from push_planner.planner import (
+    PlanError,
+    PlanningFailed,
+    PlanStatistics,
+    Progress,
+    PushPlan,
+    PushPlanner,
+    PushSegment,
+)
+from push_planner.preemptive import preemptive_pushes
+from push_planner.push_curve import PushCurve, shortest_push_curve
+from push_planner.robot_path import NoRobotPath, RobotPathError, plan_robot_path
+from push_planner.scene import PushScene, PushSide, push_sides
+from push_planner.settings import PlannerSettings
+
+__all__ = [
+    "DistanceField",
+    "NoRobotPath",
+    "PlanError",
+    "PlanStatistics",
+    "PlannerSettings",
+    "PlanningFailed",
+    "Progress",
+    "PushCurve",
+    "PushPlan",
+    "PushPlanner",
+    "PushScene",
+    "PushSegment",
+    "PushSide",
+    "RobotPathError",
+    "plan_robot_path",
+    "preemptive_pushes",
+    "push_sides",
+    "shortest_push_curve",
+]

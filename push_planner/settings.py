@@ -1,0 +1,44 @@
+"""Settings of the two-layer push planner."""
+
+from dataclasses import dataclass
+
+from push_model.settings import SettingsError, bounded
+
+
+@dataclass(frozen=True)
+class PlannerSettings:
+    """Names follow section 2.2; lengths in [m], angles in [rad]."""
+
+    length_weight: float = bounded(1.0, low=0.0, high=100.0, doc="lambda_1 of (2.1)")
+    clearance_weight: float = bounded(0.05, low=0.0, high=100.0, doc="lambda_2 of (2.1) [m^2]")
+    clearance_levels: int = bounded(4, low=1, high=20, doc="thresholds of the bottleneck sweep")
+    rrt_iterations: int = bounded(1200, low=50, high=200000, doc="RRT* iterations per threshold")
+    rrt_range: float = bounded(0.3, low=0.02, high=5.0, doc="[m] longest RRT* extension")
+    waypoint_spacing: float = bounded(0.3, low=0.02, high=5.0, doc="[m] between waypoints on Gamma")
+    heading_offsets: tuple[float, ...] = (0.0, 0.6, -0.6)
+    successor_waypoints: int = bounded(
+        2, low=1, high=50, doc="waypoints with a feasible push before Algorithm 2 stops looking"
+    )
+    max_expansions: int = bounded(150, low=1, high=100000, doc="nodes that A* may expand")
+    side_change_cost: float = bounded(0.3, low=0.0, high=10.0, doc="[m] added for a change of side")
+    friction_trust: float = bounded(
+        0.75, low=0.1, high=1.0, doc="fraction of the stable curvature that plans may use"
+    )
+    safety_distance: float = bounded(0.012, low=0.0, high=1.0, doc="[m] kept from obstacles")
+    standoff: float = bounded(0.06, low=0.005, high=2.0, doc="[m] behind contact, before a push")
+    push_speed: float = bounded(0.07, low=0.005, high=2.0, doc="[m/s]")
+    push_acceleration: float = bounded(0.05, low=0.005, high=5.0, doc="[m/s^2]")
+    move_speed: float = bounded(0.1, low=0.005, high=2.0, doc="[m/s] of the robot alone")
+    move_acceleration: float = bounded(0.15, low=0.005, high=5.0, doc="[m/s^2]")
+    turn_rate: float = bounded(1.5, low=0.05, high=10.0, doc="[rad/s] on the spot")
+    turn_acceleration: float = bounded(3.0, low=0.05, high=50.0, doc="[rad/s^2]")
+    improvement_rounds: int = bounded(
+        2, low=0, high=50, doc="further guide paths searched after the first plan"
+    )
+    seed: int = bounded(1, low=1, high=2**31, doc="of the RRT*")
+
+    def __post_init__(self) -> None:
+        if self.length_weight == 0.0 and self.clearance_weight == 0.0:
+            raise SettingsError("length_weight and clearance_weight must not both be 0")
+        if not self.heading_offsets:
+            raise SettingsError("heading_offsets needs at least one value")
