@@ -1,0 +1,51 @@
+"""Settings of the LTV-MPC and of the trajectory tracker around it."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from push_model.settings import bounded
+
+
+@dataclass(frozen=True)
+class MpcSettings:
+    """Names follow section 2.4.5."""
+
+    step: float = bounded(0.1, low=0.01, high=1.0, doc="[s] T_s of the prediction")
+    horizon: int = bounded(20, low=2, high=100, doc="p, steps predicted")
+    state_weight: tuple[float, float, float, float, float] = (40.0, 60.0, 4.0, 0.5, 0.05)
+    terminal_factor: float = bounded(5.0, low=0.0, high=1000.0, doc="P = factor * Q")
+    input_weight: tuple[float, float] = (0.05, 0.002)
+    input_rate_weight: tuple[float, float] = (0.05, 0.002)
+    max_acceleration: float = bounded(0.3, low=0.01, high=20.0, doc="[m/s^2]")
+    max_turn_acceleration: float = bounded(6.0, low=0.01, high=200.0, doc="[rad/s^2]")
+    max_acceleration_change: float = bounded(0.3, low=0.001, high=50.0, doc="[m/s^2] per step")
+    max_turn_acceleration_change: float = bounded(
+        6.0, low=0.001, high=500.0, doc="[rad/s^2] per step"
+    )
+    max_obstacles: int = bounded(20, low=0, high=200, doc="nearest obstacles in the QP")
+    slack_linear: float = bounded(20.0, low=0.0, high=1e6, doc="price of a softened row")
+    slack_quadratic: float = bounded(2000.0, low=0.0, high=1e8, doc="price of a softened row")
+    max_slack: float = bounded(0.3, low=0.0, high=100.0, doc="violation that counts as infeasible")
+    backend: Literal["daqp", "osqp"] = "daqp"
+
+
+@dataclass(frozen=True)
+class TrackerSettings:
+    """When a trajectory is done, and when it has gone wrong."""
+
+    friction_trust: float = bounded(
+        0.85, low=0.1, high=1.0, doc="fraction of the stable curvature the controller may use"
+    )
+    pose_delay: float = bounded(0.0, low=0.0, high=1.0, doc="[s] latency of the pose stream")
+    position_tolerance: float = bounded(0.006, low=1e-4, high=1.0, doc="[m] at the end")
+    orientation_tolerance: float = bounded(0.03, low=1e-4, high=3.2, doc="[rad] at the end")
+    settle_time: float = bounded(3.0, low=0.0, high=60.0, doc="[s] to reach the tolerance")
+    grasp_filter: float = bounded(0.2, low=0.0, high=10.0, doc="[s] time constant, object in robot")
+    lag_begin: float = bounded(0.02, low=1e-3, high=1.0, doc="[m] lag that slows the reference")
+    lag_end: float = bounded(0.06, low=2e-3, high=1.0, doc="[m] lag that halts the reference")
+    contact_gap: float = bounded(0.015, low=1e-3, high=1.0, doc="[m] object to bumper")
+    contact_turn: float = bounded(0.25, low=0.01, high=3.2, doc="[rad] object against bumper")
+    contact_time: float = bounded(0.5, low=0.0, high=10.0, doc="[s] until contact counts as lost")
+    off_course: float = bounded(0.08, low=1e-3, high=5.0, doc="[m] from the reference")
+    stuck_time: float = bounded(1.5, low=0.1, high=60.0, doc="[s] commanded but not moving")
+    stuck_way: float = bounded(0.03, low=1e-3, high=1.0, doc="[m] commanded in that time")
