@@ -29,7 +29,7 @@ class RobotPathError(IntEnum):
 class NoRobotPath(Exception):
     """Raised when the robot has no way; carries the code."""
 
-    def __init__(self, code: RobotPathError, message: str) -> None:
+    def __init__(self, code: int, message: str) -> None:
         super().__init__(message)
         self.code = code
 

@@ -1,0 +1,295 @@
+"""The controller node: follows trajectories with the LTV-MPC, driven by the pose stream."""
+
+import math
+import time
+from typing import Any
+
+from geometry_msgs.msg import TwistStamped
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from std_msgs.msg import Header
+
+from push_model.kinematics import unicycle_step
+from push_model.settings import SettingsError
+from push_model.stable_push import CurvatureLimits
+from push_msgs.action import FollowTrajectory
+from push_msgs.msg import ControllerStatus, NamedPoses
+from push_mpc import (
+    LtvMpc,
+    MpcSettings,
+    Push,
+    Task,
+    Tick,
+    TrackerSettings,
+    TrackError,
+    TrajectoryTracker,
+)
+from push_ros.actions import GoalServer
+from push_ros.conversions import (
+    circles_from_ros,
+    time_from_ros,
+    trajectory_from_ros,
+    twist_to_ros,
+)
+from push_ros.diagnostics import Diagnostics
+from push_ros.parameters import declare_settings
+from push_ros.pose_tracker import PoseTracker, PoseTrackerSettings, Stamp
+from push_ros.qos import COMMAND, STATUS, STREAM
+from push_ros.scenario import Scenario, load_scenario
+from push_ros.validation import InvalidMessage, check_frame, finite, planar_pose
+
+_GIVE_UP = 5.0  # [s] wall time without poses until a task is given up
+
+
+class ControllerNode(Node):
+    """Answers every frame of the pose stream with a command, zero when it has no task."""
+
+    def __init__(self, scenario: Scenario | None = None, robot: str = "") -> None:
+        super().__init__("controller")
+        name = self.declare_parameter("scenario", "env1-target1").value
+        robot = str(self.declare_parameter("robot", robot).value)
+        self._scenario = scenario or load_scenario(str(name))
+        self.robot, spec = self._scenario.robot(robot)
+        values = dict(self._scenario.parameters.get("controller", {}))
+        sections = {k: values.pop(k, {}) for k in ("mpc", "tracker", "poses")}
+        if values:
+            raise SettingsError(
+                f"controller: unknown key '{next(iter(values))}'; expected mpc, tracker or poses"
+            )
+        self._drive = spec.drive
+        self._mpc_settings = declare_settings(
+            self, MpcSettings, sections["mpc"], "mpc", "controller.mpc", self._apply_mpc
+        )
+        self._tracker_settings = declare_settings(
+            self, TrackerSettings, sections["tracker"], "tracker", "controller.tracker",
+            self._apply_tracker,
+        )
+        self._tracker: TrajectoryTracker | None = None
+        self._rebuild()
+        self._poses = PoseTracker(
+            declare_settings(self, PoseTrackerSettings, sections["poses"], "poses",
+                             "controller.poses")
+        )
+        self._object = ""
+        self._heartbeat = 0.0
+        self._heartbeat_timeout = 0.0
+        self._ticks = 0
+        self._last_wall = time.monotonic()
+        self._last_stamp = Header().stamp
+        self._reason = "no task"
+        self._mode = ControllerStatus.IDLE
+        self._diagnostics = Diagnostics(self, self._state)
+        topic = f"/{self.robot}/cmd_vel"
+        self._command_publisher = self.create_publisher(
+            TwistStamped, topic, COMMAND, event_callbacks=self._diagnostics.publisher_events(topic)
+        )
+        self._status_publisher = self.create_publisher(
+            ControllerStatus, "/controller/status", STATUS
+        )
+        self._server = GoalServer(
+            self, FollowTrajectory, f"/{self.robot}/follow_trajectory", check=self._parse,
+            start=self._begin, cancel=self._canceled,
+            preempted=lambda: self._result(
+                FollowTrajectory.Result.PREEMPTED, "a new trajectory replaces this one"
+            ),
+        )
+        self.create_subscription(Header, f"/{self.robot}/heartbeat", self._on_heartbeat, STREAM)
+        self.create_subscription(
+            NamedPoses, "/poses", self._on_poses, STREAM,
+            event_callbacks=self._diagnostics.subscription_events("/poses"),
+        )
+        self._watchdog = self.create_timer(
+            0.05, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
+
+    def _busy(self) -> None:
+        if self._tracker is not None and self._tracker.active:
+            raise SettingsError("the controller is busy; change its parameters when it is idle")
+
+    def _apply_mpc(self, settings: MpcSettings) -> None:
+        self._busy()
+        self._mpc_settings = settings
+        self._rebuild()
+
+    def _apply_tracker(self, settings: TrackerSettings) -> None:
+        self._busy()
+        self._tracker_settings = settings
+        self._rebuild()
+
+    def _rebuild(self) -> None:
+        self.tracker = TrajectoryTracker(
+            self._tracker_settings, LtvMpc(self._mpc_settings, self._drive)
+        )
+        self._tracker = self.tracker
+        self.tracker.warm_up()
+
+    def _parse(self, request: Any) -> tuple[Task, float]:
+        """A task from a goal; raises InvalidMessage."""
+        check_frame(request.trajectory.header.frame_id, "the trajectory")
+        trajectory = trajectory_from_ros(request.trajectory)
+        tolerances = (request.position_tolerance, request.orientation_tolerance)
+        finite(tolerances, "a tolerance")
+        push = None
+        if request.mode == FollowTrajectory.Goal.PUSH:
+            low, high = request.curvature_min, request.curvature_max
+            finite((low, high), "a curvature limit")
+            if not low < 0.0 < high:
+                raise InvalidMessage(f"curvature limits must enclose 0, got [{low}, {high}]")
+            if request.object not in self._scenario.objects:
+                raise InvalidMessage(f"unknown object '{request.object}'")
+            push = Push(planar_pose(request.contact, "the contact"), CurvatureLimits(low, high))
+        elif request.mode != FollowTrajectory.Goal.MOVE:
+            raise InvalidMessage(f"unknown mode {request.mode}")
+        if min(tolerances) < 0.0:
+            raise InvalidMessage("a tolerance must not be negative")
+        s = self._tracker_settings
+        return Task(
+            trajectory, push, circles_from_ros(request.obstacles),
+            tolerances[0] or s.position_tolerance, tolerances[1] or s.orientation_tolerance,
+        ), float(request.heartbeat_timeout)
+
+    def _begin(self, request: Any) -> None:
+        task, self._heartbeat_timeout = self._parse(request)
+        self._object = request.object if task.push is not None else ""
+        self._heartbeat = self._poses.stamp
+        self.tracker.start(task)
+        self._mode = ControllerStatus.PUSH if task.push else ControllerStatus.MOVE
+        self._reason = "following a trajectory"
+
+    def _canceled(self) -> None:
+        self._end(FollowTrajectory.Result.CANCELED, "canceled")
+        self._publish_command(0.0, 0.0)
+
+    def _end(self, code: int, message: str, tick: Tick | None = None) -> None:
+        self.tracker.stop()
+        self._mode = ControllerStatus.IDLE
+        self._reason = message or "done"
+        self._server.finish(self._result(code, message, tick), success=code == 0)
+
+    def _result(self, code: int, message: str, tick: Tick | None = None) -> Any:
+        result = FollowTrajectory.Result(error_code=int(code), error_msg=message)
+        if tick is not None:
+            result.position_error = tick.position_error
+            result.orientation_error = tick.orientation_error
+        return result
+
+    def _on_heartbeat(self, message: Header) -> None:
+        self._heartbeat = max(self._heartbeat, time_from_ros(message.stamp))
+
+    def _on_poses(self, message: NamedPoses) -> None:
+        if message.header.frame_id != "map":
+            self._diagnostics.refuse("/poses", f"frame '{message.header.frame_id}'")
+            return
+        before = self._poses.stamp
+        verdict = self._poses.begin(time_from_ros(message.header.stamp))
+        if verdict is Stamp.REFUSED:
+            self._diagnostics.refuse("/poses", "its stamp is zero or not newer than the last")
+            return
+        self._last_wall = time.monotonic()
+        self._last_stamp = message.header.stamp
+        seen = set()
+        for named in message.poses:
+            try:
+                if self._poses.accept(named.name, planar_pose(named.pose, named.name)):
+                    seen.add(named.name)
+            except InvalidMessage as error:
+                self._poses.refused += 1
+                self._diagnostics.refuse("/poses", str(error))
+        if verdict is Stamp.RESET:
+            self._heartbeat = 0.0
+            if self.tracker.active:
+                self._end(FollowTrajectory.Result.CLOCK_RESET, "the clock went back")
+        if verdict is Stamp.RESUMED:
+            self.tracker.v = self.tracker.omega = 0.0
+        dt = self._poses.stamp - before if verdict is Stamp.OK and before > 0.0 else 0.01
+        self._step(dt, seen)
+
+    def _step(self, dt: float, seen: set[str]) -> None:
+        tracker = self.tracker
+        if not tracker.active:
+            self._publish_command(0.0, 0.0)
+            self._publish_status(None)
+            return
+        if self._heartbeat_timeout > 0.0 and (
+            self._poses.stamp - self._heartbeat > self._heartbeat_timeout
+        ):
+            self._end(FollowTrajectory.Result.PREEMPTED, "the supervisor is gone")
+            self._publish_command(0.0, 0.0)
+            self._publish_status(None)
+            return
+        robot = self._poses.pose(self.robot)
+        item = self._poses.pose(self._object) if self._object else None
+        if robot is None or (self._object and item is None):
+            tracker.v = tracker.omega = 0.0
+            self._mode = ControllerStatus.HOLD
+            self._reason = f"no valid pose of {self.robot if robot is None else self._object}"
+            self._publish_command(0.0, 0.0)
+            self._publish_status(None)
+            return
+        age = self._poses.age(self.robot)
+        if age > 0.0:  # dead reckoning over a drop-out
+            robot = unicycle_step(robot, tracker.v, tracker.omega, age)
+        tick = tracker.tick(dt, robot, item if self._object in seen else None)
+        self._publish_command(tick.v, tick.omega)
+        failed = tick.solve is not None and not tick.solve.solved
+        self._mode = ControllerStatus.FALLBACK if failed else (
+            ControllerStatus.PUSH if self._object else ControllerStatus.MOVE
+        )
+        self._reason = tick.solve.reason if failed and tick.solve else "following a trajectory"
+        self._publish_status(tick)
+        self._ticks += 1
+        if tick.finished:
+            self._end(int(tick.code), tick.message, tick)
+        elif self._ticks % 10 == 0:
+            self._server.feedback(
+                FollowTrajectory.Feedback(
+                    progress=tick.progress, position_error=tick.position_error,
+                    orientation_error=tick.orientation_error,
+                )
+            )
+
+    def _publish_command(self, v: float, omega: float) -> None:
+        if not (math.isfinite(v) and math.isfinite(omega)):
+            v = omega = 0.0
+        self._command_publisher.publish(twist_to_ros(v, omega, self._last_stamp))
+
+    def _publish_status(self, tick: Tick | None) -> None:
+        message = ControllerStatus(
+            mode=self._mode, robot=self.robot, reason=self._reason, solves=self.tracker.solves,
+            failures=self.tracker.failures, curvature_margin=math.inf, obstacle_margin=math.inf,
+        )
+        message.header.stamp = self._last_stamp
+        message.header.frame_id = "map"
+        if tick is not None:
+            e = tick.error
+            message.error_x, message.error_y, message.error_theta = float(e[0]), float(e[1]), float(e[2])
+            message.error_v, message.error_omega = float(e[3]), float(e[4])
+            message.v, message.omega = tick.v, tick.omega
+            message.curvature_margin = tick.curvature_margin
+            message.obstacle_margin = tick.obstacle_margin
+            message.object_offset_y = tick.object_offset
+            if tick.solve is not None:
+                message.solve_time = tick.solve.solve_time
+                message.slack = tick.solve.slack
+        self._status_publisher.publish(message)
+
+    def _on_watchdog(self) -> None:
+        """Wall time: the pose stream may be dead, and with it every other clock."""
+        silence = time.monotonic() - self._last_wall
+        if not self.tracker.active or silence < 2.0 * self._poses.settings.timeout:
+            return
+        self._publish_command(0.0, 0.0)
+        if silence > _GIVE_UP:
+            self._end(FollowTrajectory.Result.POSES_STALE, f"no poses for {silence:.1f} s")
+
+    def stop(self) -> None:
+        """Last act of a live process: a zero command."""
+        self._publish_command(0.0, 0.0)
+
+    def _state(self) -> dict[str, Any]:
+        stale = self.tracker.active and time.monotonic() - self._last_wall > 0.3
+        return {
+            "mode": self._mode, "reason": self._reason, "solves": self.tracker.solves,
+            "failures": self.tracker.failures, "poses refused": self._poses.refused,
+            "pose jumps": self._poses.jumps, "warning": "poses are stale" if stale else "",
+        }

@@ -1,0 +1,220 @@
+"""The planner node: the PlanPush action and the PlanRobotPath service."""
+
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from nav_msgs.msg import OccupancyGrid, Path
+from rclpy.node import Node
+
+from push_model.occupancy import OccupancyGrid as Grid
+from push_model.settings import SettingsError
+from push_msgs.action import PlanPush
+from push_msgs.msg import PushPlan as PlanMessage
+from push_msgs.srv import PlanRobotPath
+from push_planner import (
+    NoRobotPath,
+    PlannerSettings,
+    PlanningFailed,
+    Progress,
+    PushPlan,
+    PushPlanner,
+    plan_robot_path,
+)
+from push_ros.actions import GoalServer
+from push_ros.conversions import (
+    circles_from_ros,
+    grid_from_ros,
+    path_to_ros,
+    plan_to_ros,
+    trajectory_to_ros,
+)
+from push_ros.diagnostics import Diagnostics
+from push_ros.parameters import declare_settings
+from push_ros.qos import LATCHED
+from push_ros.scenario import Scenario, load_scenario
+from push_ros.validation import FRAME, InvalidMessage, planar_pose
+
+
+class PlannerNode(Node):
+    """Plans in slices between which its executor serves others, so that a goal can be cancelled."""
+
+    def __init__(self, scenario: Scenario | None = None) -> None:
+        super().__init__("planner")
+        name = self.declare_parameter("scenario", "env1-target1").value
+        self._scenario = scenario or load_scenario(str(name))
+        self.settings = declare_settings(
+            self, PlannerSettings, self._scenario.parameters.get("planner", {}), where="planner",
+            apply=self._apply,
+        )
+        self._planners: dict[tuple[str, str], PushPlanner] = {}
+        self._grid: Grid | None = None
+        self._work: Iterator[Progress] | None = None
+        self._best: PushPlan | None = None
+        self.plans = self.failures = 0
+        self.last_time = 0.0
+        self._diagnostics = Diagnostics(self, self._state)
+        self._plan_publisher = self.create_publisher(PlanMessage, "/push_plan", LATCHED)
+        self._path_publisher = self.create_publisher(Path, "/push_path", LATCHED)
+        self.create_subscription(
+            OccupancyGrid, "/map", self._on_map, LATCHED,
+            event_callbacks=self._diagnostics.subscription_events("/map"),
+        )
+        self._server = GoalServer(
+            self, PlanPush, "/plan_push", check=lambda request: None, start=self._begin,
+            cancel=self._canceled,
+            preempted=lambda: PlanPush.Result(
+                error_code=PlanPush.Result.CANCELED, error_msg="a new request replaces this one"
+            ),
+        )
+        self.create_service(PlanRobotPath, "/plan_robot_path", self._on_robot_path)
+        self._on_grid(self._scenario.grid)  # until a map comes, and to warm up
+        self._warm_up()
+        self._grid = None
+
+    def _apply(self, settings: PlannerSettings) -> None:
+        if self._work is not None:
+            raise SettingsError("the planner is busy; change its parameters when it is idle")
+        self.settings = settings
+        self._planners.clear()
+
+    def _on_map(self, message: OccupancyGrid) -> None:
+        try:
+            self._on_grid(grid_from_ros(message))
+        except InvalidMessage as error:
+            self._diagnostics.refuse("/map", str(error))
+
+    def _on_grid(self, grid: Grid) -> None:
+        self._grid = grid
+        self._planners.clear()
+
+    def _planner(self, robot: str, item: str) -> PushPlanner:
+        assert self._grid is not None
+        robot, robot_spec = self._scenario.robot(robot)
+        item, item_spec = self._scenario.object(item)
+        key = (robot, item)
+        if key not in self._planners:
+            self._planners[key] = PushPlanner(self.settings, self._grid, robot_spec, item_spec)
+        return self._planners[key]
+
+    def _warm_up(self) -> None:
+        """Load what is compiled before the first request: plan a short push."""
+        if not self._scenario.objects:
+            return
+        start = next(iter(self._scenario.objects.values()))[1]
+        planner = self._planner("", "")
+        quick = replace(planner.settings, improvement_rounds=0, rrt_iterations=50, max_expansions=2)
+        trial = PushPlanner(quick, planner.scene.field.grid, planner.scene.robot, planner.scene.item)
+        ahead = start + np.array([0.3 * np.cos(start[2]), 0.3 * np.sin(start[2]), 0.0])
+        try:
+            trial.solve(start, ahead)
+        except PlanningFailed as error:
+            self.get_logger().debug(f"warm-up: {error}")
+
+    def _begin(self, request: Any) -> None:
+        self._started = time.monotonic()
+        self._best = None
+        self._work = None
+        try:
+            self._request = request
+            if self._grid is None:
+                self._fail(PlanPush.Result.NO_MAP, "no map has been received on /map")
+                return
+            for stamped in (request.start, request.goal):
+                if stamped.header.frame_id != FRAME:
+                    self._fail(
+                        PlanPush.Result.UNKNOWN_FRAME,
+                        f"frame '{stamped.header.frame_id}' is not known, expected '{FRAME}'",
+                    )
+                    return
+            start = planar_pose(request.start.pose, "the start")
+            goal = planar_pose(request.goal.pose, "the goal")
+            planner = self._planner(request.robot, request.object)
+            self._work = planner.plan(start, goal)
+            self._continue()
+        except InvalidMessage as error:
+            self._fail(PlanPush.Result.INVALID_GOAL, str(error))
+        except SettingsError as error:
+            self._fail(PlanPush.Result.UNKNOWN_OBJECT, str(error))
+
+    def _continue(self) -> None:
+        """Queue the next slice behind whatever else the executor has to do."""
+        assert self.executor is not None
+        self.executor.create_task(self._on_slice)
+
+    def _on_slice(self) -> None:
+        if self._work is None:
+            return
+        try:
+            progress = next(self._work)
+        except StopIteration:
+            self._succeed()
+            return
+        except PlanningFailed as error:
+            self._fail(int(error.code), str(error))
+            return
+        elapsed = time.monotonic() - self._started
+        improved = progress.best is not self._best
+        self._best = progress.best
+        if improved and self._best is not None:
+            self._publish(self._best)
+            cost = self._best.cost
+            self._server.feedback(
+                PlanPush.Feedback(elapsed=elapsed, best_cost=cost, stage=progress.stage)
+            )
+        if self._best is not None and 0.0 < self._request.time_budget < elapsed:
+            self._succeed()
+            return
+        self._continue()
+
+    def _publish(self, plan: PushPlan) -> None:
+        robot, _ = self._scenario.robot(self._request.robot)
+        item, _ = self._scenario.object(self._request.object)
+        now = self._now()
+        self._plan_message = plan_to_ros(plan, robot, item, now)
+        self._plan_publisher.publish(self._plan_message)
+        self._path_publisher.publish(path_to_ros([s.trajectory for s in plan.segments], now))
+
+    def _now(self) -> float:
+        return 1e-9 * self.get_clock().now().nanoseconds
+
+    def _succeed(self) -> None:
+        self._work = None
+        self.plans += 1
+        self.last_time = time.monotonic() - self._started
+        self._server.finish(PlanPush.Result(plan=self._plan_message), success=True)
+
+    def _fail(self, code: int, message: str) -> None:
+        self._work = None
+        self.failures += 1
+        self._server.finish(PlanPush.Result(error_code=code, error_msg=message), success=False)
+
+    def _canceled(self) -> None:
+        self._fail(PlanPush.Result.CANCELED, "canceled")
+
+    def _on_robot_path(self, request: Any, response: Any) -> Any:
+        try:
+            if self._grid is None:
+                raise NoRobotPath(response.NO_MAP, "no map has been received on /map")
+            start, goal = planar_pose(request.start, "start"), planar_pose(request.goal, "goal")
+            planner = self._planner("", "")
+            trajectory = plan_robot_path(
+                planner.scene.field, planner.scene.robot, self.settings, start, goal,
+                circles_from_ros(request.obstacles),
+            )
+            response.error_code = response.NONE
+            response.trajectory = trajectory_to_ros(trajectory)
+        except NoRobotPath as error:
+            response.error_code, response.message = int(error.code), str(error)
+        except (InvalidMessage, SettingsError) as error:
+            response.error_code, response.message = response.INVALID, str(error)
+        return response
+
+    def _state(self) -> dict[str, Any]:
+        return {
+            "plans": self.plans, "failures": self.failures, "planning": self._work is not None,
+            "last plan time": f"{self.last_time:.3f} s",
+            "warning": "" if self._grid is not None else "no map yet",
+        }

@@ -1,0 +1,140 @@
+"""Long jobs as actions, without blocking an executor.
+
+``GoalServer`` keeps at most one goal; a new one replaces it. ``GoalClient`` sends one goal at a time
+and forgets about answers to earlier ones.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
+from rclpy.node import Node
+
+
+class GoalServer:
+    """An action server for one goal at a time.
+
+    check: raises an exception whose text is logged when the goal must be rejected.
+    start: called with the goal's request. cancel: called when the goal shall end; the owner answers
+    with ``finish``. preempted: result for a goal that a new one replaces.
+    """
+
+    def __init__(
+        self, node: Node, action: Any, name: str, *, check: Callable[[Any], None],
+        start: Callable[[Any], None], cancel: Callable[[], None],
+        preempted: Callable[[], Any],
+    ) -> None:
+        self._node = node
+        self._action = action
+        self._check, self._start, self._cancel = check, start, cancel
+        self._preempted = preempted
+        self._handle: Any = None
+        self._server = ActionServer(
+            node, action, name, execute_callback=self._execute, goal_callback=self._on_goal,
+            handle_accepted_callback=self._on_accepted, cancel_callback=self._on_cancel,
+            result_timeout=30,
+        )
+
+    @property
+    def active(self) -> bool:
+        """Whether a goal is under way."""
+        return self._handle is not None
+
+    def _on_goal(self, request: Any) -> GoalResponse:
+        try:
+            self._check(request)
+        except Exception as error:  # a bad goal must never end the node
+            self._node.get_logger().warning(f"goal rejected: {error}")
+            return GoalResponse.REJECT
+        return GoalResponse.ACCEPT
+
+    def _on_accepted(self, handle: Any) -> None:
+        if self._handle is not None:
+            self.finish(self._preempted(), success=False)
+        self._handle = handle
+        self._start(handle.request)
+
+    def _on_cancel(self, handle: Any) -> CancelResponse:
+        # The handle given here is a copy; compare by goal id.
+        if self._handle is None or bytes(handle.goal_id.uuid) != bytes(self._handle.goal_id.uuid):
+            return CancelResponse.REJECT
+        self._cancel()
+        return CancelResponse.ACCEPT
+
+    def feedback(self, message: Any) -> None:
+        """Publish feedback on the current goal, if there is one."""
+        if self._handle is not None:
+            self._handle.publish_feedback(message)
+
+    def finish(self, result: Any, success: bool) -> None:
+        """End the current goal, if there is one."""
+        handle, self._handle = self._handle, None
+        if handle is None:
+            return
+        # Executing is only the delivery of the result: the work is already done.
+        handle.execute(lambda h: self._deliver(h, result, success))
+
+    def _deliver(self, handle: Any, result: Any, success: bool) -> Any:
+        if handle.is_cancel_requested:
+            handle.canceled()
+        elif success:
+            handle.succeed()
+        else:
+            handle.abort()
+        return result
+
+    def _execute(self, handle: Any) -> Any:
+        raise RuntimeError("goals are delivered by finish()")
+
+
+class GoalClient:
+    """An action client that follows its newest goal only."""
+
+    def __init__(self, node: Node, action: Any, name: str) -> None:
+        self.name = name
+        self._client = ActionClient(node, action, name)
+        self._token = 0
+        self._handle: Any = None
+
+    @property
+    def ready(self) -> bool:
+        """Whether a server is there."""
+        return bool(self._client.server_is_ready())
+
+    def send(
+        self, goal: Any, done: Callable[[Any], None], feedback: Callable[[Any], None] | None = None
+    ) -> None:
+        """Send a goal; ``done`` gets the result, or None when the goal was rejected."""
+        self.forget()
+        token = self._token
+
+        def on_feedback(message: Any) -> None:
+            if token == self._token and feedback is not None:
+                feedback(message.feedback)
+
+        def on_response(future: Any) -> None:
+            handle = future.result()
+            if token != self._token:
+                if handle is not None and handle.accepted:
+                    handle.cancel_goal_async()  # canceled before it was accepted
+                return
+            if handle is None or not handle.accepted:
+                done(None)
+                return
+            self._handle = handle
+            handle.get_result_async().add_done_callback(on_result)
+
+        def on_result(future: Any) -> None:
+            if token == self._token:
+                self._handle = None
+                answer = future.result()
+                done(None if answer is None else answer.result)
+
+        self._client.send_goal_async(goal, on_feedback).add_done_callback(on_response)
+
+    def forget(self) -> None:
+        """Cancel the goal under way and ignore whatever still comes of it."""
+        self._token += 1
+        handle, self._handle = self._handle, None
+        if handle is not None:
+            handle.cancel_goal_async()

@@ -1,0 +1,180 @@
+"""Between messages and the project's types: ``x_to_ros`` and ``x_from_ros``, free functions."""
+
+import array
+import math
+from typing import Any
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, TransformStamped, TwistStamped
+from nav_msgs.msg import OccupancyGrid as GridMessage
+from nav_msgs.msg import Path
+
+from push_model import se2
+from push_model.arrays import Array
+from push_model.occupancy import OccupancyGrid
+from push_model.trajectory import Trajectory
+from push_msgs.msg import Circle
+from push_msgs.msg import PlanStatistics as StatisticsMessage
+from push_msgs.msg import PushPlan as PlanMessage
+from push_msgs.msg import PushSegment as SegmentMessage
+from push_msgs.msg import Trajectory as TrajectoryMessage
+from push_ros.validation import FRAME, InvalidMessage, finite
+
+
+def time_to_ros(seconds: float) -> Time:
+    """[s] to a stamp."""
+    nanoseconds = round(seconds * 1e9)
+    return Time(sec=nanoseconds // 1_000_000_000, nanosec=nanoseconds % 1_000_000_000)
+
+
+def time_from_ros(stamp: Time) -> float:
+    """A stamp in [s]."""
+    return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
+
+
+def pose_to_ros(pose: Array) -> Pose:
+    """Pose ``(3,)`` to geometry_msgs/Pose."""
+    _, _, z, w = se2.quaternion_from_yaw(float(pose[2]))
+    return Pose(
+        position=Point(x=float(pose[0]), y=float(pose[1])), orientation=Quaternion(z=z, w=w)
+    )
+
+
+def pose_stamped_to_ros(pose: Array, seconds: float) -> PoseStamped:
+    """Pose ``(3,)`` in the fixed frame to geometry_msgs/PoseStamped."""
+    message = PoseStamped(pose=pose_to_ros(pose))
+    message.header.frame_id = FRAME
+    message.header.stamp = time_to_ros(seconds)
+    return message
+
+
+def transform_to_ros(name: str, pose: Array, seconds: float) -> TransformStamped:
+    """Pose ``(3,)`` of a body as a transform from the fixed frame."""
+    message = TransformStamped(child_frame_id=name)
+    message.header.frame_id = FRAME
+    message.header.stamp = time_to_ros(seconds)
+    message.transform.translation.x = float(pose[0])
+    message.transform.translation.y = float(pose[1])
+    _, _, message.transform.rotation.z, message.transform.rotation.w = se2.quaternion_from_yaw(
+        float(pose[2])
+    )
+    return message
+
+
+def twist_to_ros(v: float, omega: float, stamp: Time) -> TwistStamped:
+    """A command that answers the poses of a stamp."""
+    message = TwistStamped()
+    message.header.stamp = stamp
+    message.header.frame_id = "base_link"
+    message.twist.linear.x = v
+    message.twist.angular.z = omega
+    return message
+
+
+def trajectory_to_ros(trajectory: Trajectory) -> TrajectoryMessage:
+    """Trajectory to its message."""
+    message = TrajectoryMessage()
+    message.header.frame_id = FRAME
+    columns = [trajectory.time, *trajectory.pose.T, *trajectory.twist.T]
+    for name, column in zip(("time", "x", "y", "theta", "v", "omega"), columns, strict=True):
+        setattr(message, name, array.array("d", np.ascontiguousarray(column).tobytes()))
+    return message
+
+
+def trajectory_from_ros(message: TrajectoryMessage) -> Trajectory:
+    """Message to a trajectory; raises InvalidMessage when it is none."""
+    columns = [np.asarray(getattr(message, n), dtype=np.float64)
+               for n in ("time", "x", "y", "theta", "v", "omega")]
+    if len({len(c) for c in columns}) != 1:
+        raise InvalidMessage("a trajectory's arrays must have the same length")
+    try:
+        return Trajectory(columns[0], np.column_stack(columns[1:4]), np.column_stack(columns[4:]))
+    except ValueError as error:
+        raise InvalidMessage(str(error)) from None
+
+
+def circles_to_ros(circles: Array) -> list[Circle]:
+    """``(n, 3)`` x, y, radius to messages."""
+    return [Circle(x=float(x), y=float(y), radius=float(r)) for x, y, r in circles]
+
+
+def circles_from_ros(messages: Any) -> Array:
+    """Messages to ``(n, 3)``; raises InvalidMessage when not finite."""
+    circles = np.array([[c.x, c.y, c.radius] for c in messages], dtype=np.float64).reshape(-1, 3)
+    finite(circles, "an obstacle")
+    return circles
+
+
+def grid_to_ros(grid: OccupancyGrid, seconds: float) -> GridMessage:
+    """Occupancy grid to nav_msgs/OccupancyGrid: 0 free, 100 occupied."""
+    message = GridMessage()
+    message.header.frame_id = FRAME
+    message.header.stamp = time_to_ros(seconds)
+    message.info.map_load_time = message.header.stamp
+    message.info.resolution = float(grid.resolution)
+    message.info.height, message.info.width = grid.occupied.shape
+    message.info.origin = pose_to_ros(np.array([*grid.origin, 0.0]))
+    message.data = array.array("b", (grid.occupied.astype(np.int8) * 100).tobytes())
+    return message
+
+
+def grid_from_ros(message: GridMessage) -> OccupancyGrid:
+    """nav_msgs/OccupancyGrid to a grid; unknown cells count as occupied."""
+    info = message.info
+    rows, columns = int(info.height), int(info.width)
+    data = np.asarray(message.data, dtype=np.int8)
+    if rows < 3 or columns < 3 or data.size != rows * columns:
+        raise InvalidMessage(f"a map of {rows} x {columns} cells with {data.size} values")
+    if not (math.isfinite(info.resolution) and info.resolution > 0.0):
+        raise InvalidMessage(f"a map with a resolution of {info.resolution} m")
+    q = info.origin.orientation
+    finite((info.origin.position.x, info.origin.position.y, q.z, q.w), "the map's origin")
+    if abs(se2.yaw_from_quaternion(q.x, q.y, q.z, q.w)) > 1e-6:
+        raise InvalidMessage("a map whose origin is rotated is not supported")
+    cells = data.reshape(rows, columns)
+    origin = np.array([info.origin.position.x, info.origin.position.y])
+    return OccupancyGrid((cells < 0) | (cells >= 50), round(float(info.resolution), 9), origin)
+
+
+def plan_to_ros(plan: Any, robot: str, item: str, seconds: float) -> PlanMessage:
+    """push_planner.PushPlan to its message."""
+    message = PlanMessage(robot=robot, object=item, goal=pose_to_ros(plan.goal))
+    message.header.frame_id = FRAME
+    message.header.stamp = time_to_ros(seconds)
+    message.cost, message.length = float(plan.cost), float(plan.length)
+    message.clearance = float(plan.clearance)
+    message.segments = [segment_to_ros(s) for s in plan.segments]
+    message.statistics = StatisticsMessage(
+        **{k: type(v)(v) if isinstance(v, int) else float(v)
+           for k, v in vars(plan.statistics).items()}
+    )
+    return message
+
+
+def segment_to_ros(segment: Any) -> SegmentMessage:
+    """push_planner.PushSegment to its message."""
+    return SegmentMessage(
+        side=segment.side.index,
+        object_start=pose_to_ros(segment.object_start),
+        object_end=pose_to_ros(segment.object_end),
+        robot_start=pose_to_ros(segment.curve.start),
+        robot_end=pose_to_ros(segment.curve.end),
+        robot_standoff=pose_to_ros(segment.standoff),
+        k_start=float(segment.curve.k_start), k_end=float(segment.curve.k_end),
+        length=float(segment.curve.length),
+        curvature_min=float(segment.side.nominal.minimum),
+        curvature_max=float(segment.side.nominal.maximum),
+        trajectory=trajectory_to_ros(segment.trajectory),
+    )
+
+
+def path_to_ros(trajectories: list[Trajectory], seconds: float) -> Path:
+    """Trajectories one after the other as nav_msgs/Path."""
+    message = Path()
+    message.header.frame_id = FRAME
+    message.header.stamp = time_to_ros(seconds)
+    for trajectory in trajectories:
+        for pose in trajectory.pose[:: max(1, len(trajectory.pose) // 100)]:
+            message.poses.append(pose_stamped_to_ros(pose, seconds))
+    return message

@@ -1,0 +1,130 @@
+"""From a stream of tracked poses to poses that may be acted on. No ROS here.
+
+Policy on stamps: zero is refused; one that is not newer than the last is refused, unless it lies back
+by more than ``reset_gap``, which counts as a reset of the clock; a gap forward beyond ``timeout`` counts
+as an interruption of the stream, after which a body's next pose is taken as it is.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from push_model import se2
+from push_model.arrays import Array
+from push_model.settings import bounded
+
+
+@dataclass(frozen=True)
+class PoseTrackerSettings:
+    """When a pose is too old or too far."""
+
+    timeout: float = bounded(0.15, low=0.01, high=5.0, doc="[s] age at which a pose is stale")
+    max_speed: float = bounded(0.5, low=0.01, high=20.0, doc="[m/s] a body can plausibly move")
+    max_turn_rate: float = bounded(10.0, low=0.1, high=100.0, doc="[rad/s] it can plausibly turn")
+    jump_margin: float = bounded(0.02, low=0.0, high=1.0, doc="[m] allowed beyond max_speed")
+    turn_margin: float = bounded(0.2, low=0.0, high=3.2, doc="[rad] allowed beyond max_turn_rate")
+    persistence: int = bounded(
+        10, low=1, high=1000, doc="frames a jumped pose must persist before it is believed"
+    )
+    reset_gap: float = bounded(0.5, low=0.01, high=60.0, doc="[s] back in time that means a reset")
+
+
+class Stamp(Enum):
+    """Verdict on a frame's stamp."""
+
+    OK = "ok"
+    REFUSED = "refused"
+    RESET = "reset"
+    RESUMED = "resumed"
+
+
+@dataclass
+class _Body:
+    pose: Array
+    stamp: float
+    candidate: Array | None = None
+    repeats: int = 0
+
+
+class PoseTracker:
+    """Gates the poses of named bodies.
+
+    Counters: refused (non-finite pose or bad stamp), jumps (gated poses).
+    """
+
+    def __init__(self, settings: PoseTrackerSettings | None = None) -> None:
+        self.settings = settings or PoseTrackerSettings()
+        self.refused = 0
+        self.jumps = 0
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all bodies and the clock."""
+        self.stamp = 0.0
+        self._bodies: dict[str, _Body] = {}
+
+    def begin(self, stamp: float) -> Stamp:
+        """Judge the stamp [s] of a frame; only poses of accepted frames may be given to ``accept``."""
+        if not np.isfinite(stamp) or stamp <= 0.0:
+            self.refused += 1
+            return Stamp.REFUSED
+        verdict = Stamp.OK
+        if self.stamp > 0.0:
+            if stamp < self.stamp - self.settings.reset_gap:
+                self.reset()
+                verdict = Stamp.RESET
+            elif stamp <= self.stamp:
+                self.refused += 1
+                return Stamp.REFUSED
+            elif stamp > self.stamp + self.settings.timeout:
+                verdict = Stamp.RESUMED
+        self.stamp = stamp
+        return verdict
+
+    def accept(self, name: str, pose: Array) -> bool:
+        """Offer a pose ``(3,)`` of this frame; False when it is refused or gated."""
+        if not np.isfinite(pose).all():
+            self.refused += 1
+            return False
+        body = self._bodies.get(name)
+        if body is None:
+            self._bodies[name] = _Body(pose, self.stamp)
+            return True
+        s = self.settings
+        # Long unseen is not a licence to be anywhere: the allowance stops growing.
+        elapsed = min(self.stamp - body.stamp, 4.0 * s.timeout)
+        if self._close(body.pose, pose, elapsed):
+            self._bodies[name] = _Body(pose, self.stamp)
+            return True
+        self.jumps += 1
+        if body.candidate is not None and self._close(body.candidate, pose, s.timeout):
+            body.repeats += 1
+        else:
+            body.repeats = 1
+        body.candidate = pose
+        if body.repeats >= s.persistence:
+            self._bodies[name] = _Body(pose, self.stamp)
+            return True
+        return False
+
+    def _close(self, first: Array, second: Array, elapsed: float) -> bool:
+        s = self.settings
+        way = float(np.hypot(*(second - first)[:2]))
+        turn = abs(se2.wrap(float(second[2] - first[2])))
+        return (
+            way <= s.max_speed * elapsed + s.jump_margin
+            and turn <= s.max_turn_rate * elapsed + s.turn_margin
+        )
+
+    def pose(self, name: str) -> Array | None:
+        """The last accepted pose, None when there is none or it is stale."""
+        body = self._bodies.get(name)
+        if body is None or self.stamp - body.stamp > self.settings.timeout:
+            return None
+        return body.pose
+
+    def age(self, name: str) -> float:
+        """[s] since the last accepted pose; inf when there is none."""
+        body = self._bodies.get(name)
+        return float("inf") if body is None else self.stamp - body.stamp

@@ -1,0 +1,96 @@
+"""Starting, spinning and stopping nodes."""
+
+import contextlib
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+from push_model.settings import SettingsError
+
+
+def prepare_environment(environment: dict[str, str] | None = None) -> dict[str, str]:
+    """Defaults for a suite on one machine: local discovery, quick, one BLAS thread."""
+    env = os.environ if environment is None else environment
+    env.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    env.setdefault("OPENBLAS_NUM_THREADS", "1")
+    env.setdefault("RCUTILS_LOGGING_USE_STDOUT", "0")
+    profile = Path(__file__).parent / "discovery.xml"
+    env.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(profile))
+    return env  # type: ignore[return-value]
+
+
+class Spinner:
+    """An executor for some nodes, spun by its owner."""
+
+    def __init__(self, nodes: Sequence[Node]) -> None:
+        self.nodes = list(nodes)
+        self.executor = EventsExecutor()
+        for node in self.nodes:
+            self.executor.add_node(node)
+
+    def once(self, timeout: float = 0.1) -> None:
+        """Handle what is there, or wait for it up to timeout [s]; without one rclpy may hang."""
+        self.executor.spin_once(timeout)
+
+    def until(self, condition: Callable[[], bool], limit: float) -> bool:
+        """Spin until the condition holds; False when it does not within limit [s] wall time."""
+        end = time.monotonic() + limit
+        while not condition():
+            if time.monotonic() > end or not rclpy.ok():
+                return False
+            self.once(0.05)
+        return True
+
+    def close(self) -> None:
+        """Destroy the nodes."""
+        for node in self.nodes:
+            self.executor.remove_node(node)
+            with contextlib.suppress(Exception):
+                node.destroy_node()
+        self.nodes.clear()
+
+
+def run_node(make: Callable[[], Node], arguments: Sequence[str] | None = None) -> int:
+    """Run one node until a signal; returns an exit code.
+
+    SIGINT and SIGTERM end the spinning; the node's ``stop`` method, if it has one, is called while
+    it can still publish.
+    """
+    prepare_environment()
+    stopping = False
+
+    def on_signal(number: int, frame: Any) -> None:
+        nonlocal stopping
+        stopping = True
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, on_signal)
+    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    spinner: Spinner | None = None
+    try:
+        node = make()
+        spinner = Spinner([node])
+        while rclpy.ok() and not stopping:
+            spinner.once(0.1)
+        stop = getattr(node, "stop", None)
+        if stop is not None:
+            stop()
+    except SettingsError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        pass
+    finally:
+        if spinner is not None:
+            spinner.close()
+        rclpy.try_shutdown()
+    return 0

@@ -1,0 +1,20 @@
+"""Named QoS profiles; every publisher and subscription of the project takes one of these."""
+
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+STREAM = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""Poses and the like: the newest counts, a lost one is not sent again."""
+
+COMMAND = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+"""Velocity commands and goals."""
+
+STATUS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+"""Status, diagnostics, markers."""
+
+LATCHED = QoSProfile(
+    depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)
+"""Kept for late subscribers: map, plan, state."""
+
+CLOCK = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""/clock, as rclpy subscribes to it."""

@@ -1,0 +1,12 @@
+"""Supervision of a manipulation (section 2.5): a pure state machine, and its node."""
+
+from push_supervisor.machine import (
+    Command,
+    Event,
+    JobError,
+    Machine,
+    State,
+    SupervisorSettings,
+)
+
+__all__ = ["Command", "Event", "JobError", "Machine", "State", "SupervisorSettings"]

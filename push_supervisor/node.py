@@ -1,0 +1,517 @@
+"""The supervisor node: goals in, plans and trajectories out, one state machine in between."""
+
+import time
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import PoseStamped
+from nav_msgs.msg import OccupancyGrid
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from std_msgs.msg import Header, String
+from std_srvs.srv import Trigger
+
+from push_model import se2
+from push_model.arrays import Array
+from push_model.occupancy import OccupancyGrid as Grid
+from push_model.settings import SettingsError
+from push_model.trajectory import Trajectory, line
+from push_msgs.action import FollowTrajectory, MoveObject, PlanPush
+from push_msgs.msg import NamedPoses, SupervisorState
+from push_msgs.srv import PlanRobotPath
+from push_planner import PlannerSettings, PushPlanner, preemptive_pushes
+from push_ros.actions import GoalClient, GoalServer
+from push_ros.conversions import (
+    circles_to_ros,
+    grid_from_ros,
+    pose_stamped_to_ros,
+    pose_to_ros,
+    segment_to_ros,
+    time_from_ros,
+    trajectory_to_ros,
+)
+from push_ros.diagnostics import Diagnostics
+from push_ros.parameters import declare_settings
+from push_ros.pose_tracker import PoseTracker, PoseTrackerSettings, Stamp
+from push_ros.qos import COMMAND, LATCHED, STREAM
+from push_ros.scenario import Scenario, load_scenario
+from push_ros.validation import InvalidMessage, planar_pose, stamped_pose
+from push_supervisor import Command, Event, JobError, Machine, State, SupervisorSettings
+
+_PLAN_ERRORS = {
+    PlanPush.Result.INVALID_GOAL: JobError.INVALID_GOAL,
+    PlanPush.Result.UNKNOWN_OBJECT: JobError.UNKNOWN_OBJECT,
+    PlanPush.Result.UNKNOWN_FRAME: JobError.UNKNOWN_FRAME,
+    PlanPush.Result.OUTSIDE_MAP: JobError.OUTSIDE_MAP,
+    PlanPush.Result.GOAL_OCCUPIED: JobError.GOAL_OCCUPIED,
+}
+_RETRY_CODES = (PlanPush.Result.NO_PUSH_SEQUENCE,)
+_OBSTACLE_SPACING = 0.04  # [m] between the round obstacles that stand for a wall
+
+
+class SupervisorNode(Node):
+    """One robot, one object, one job at a time."""
+
+    def __init__(self, scenario: Scenario | None = None, robot: str = "", item: str = "") -> None:
+        super().__init__("supervisor")
+        name = self.declare_parameter("scenario", "env1-target1").value
+        robot = str(self.declare_parameter("robot", robot).value)
+        item = str(self.declare_parameter("object", item).value)
+        self._scenario = scenario or load_scenario(str(name))
+        self.robot, self._robot_spec = self._scenario.robot(robot)
+        self.object, self._object_spec = self._scenario.object(item)
+        values = dict(self._scenario.parameters.get("supervisor", {}))
+        poses = values.pop("poses", {})
+        self.settings = declare_settings(
+            self, SupervisorSettings, values, where="supervisor", apply=self._apply
+        )
+        self._planner_settings = declare_settings(
+            self, PlannerSettings, self._scenario.parameters.get("planner", {}), "planner",
+            "planner",
+        )
+        self._poses = PoseTracker(
+            declare_settings(self, PoseTrackerSettings, poses, "poses", "supervisor.poses")
+        )
+        self._object_radius = self._object_spec.geometry.circumradius
+        self.machine = Machine(self.settings, self._at_goal)
+        self._obstacles = np.zeros((0, 3))
+        self._grid: Grid | None = None
+        self._ticks = 0
+        self._seed = 0
+        self._last_wall = time.monotonic()
+        self._lost_since: float | None = None
+        self._displaced = 0
+        self._path_token = 0
+        self._queue: list[tuple[Event, dict[str, Any]]] = []
+        self._handling = False
+        self._waiting: tuple[Command, dict[str, Any]] | None = None
+        self._diagnostics = Diagnostics(self, self._diagnose)
+        self._connect()
+        self._publish_state()
+
+    def _connect(self) -> None:
+        events = self._diagnostics.subscription_events
+        self._state_publisher = self.create_publisher(SupervisorState, "/supervisor/state", LATCHED)
+        self._text_publisher = self.create_publisher(String, "/supervisor/status_text", LATCHED)
+        self._heartbeat_publisher = self.create_publisher(
+            Header, f"/{self.robot}/heartbeat", STREAM
+        )
+        self._plan_client = GoalClient(self, PlanPush, "/plan_push")
+        self._follow_client = GoalClient(self, FollowTrajectory, f"/{self.robot}/follow_trajectory")
+        self._path_client = self.create_client(PlanRobotPath, "/plan_robot_path")
+        self._job = GoalServer(
+            self, MoveObject, "/move_object", check=lambda request: None, start=self._on_job,
+            cancel=self._cancel,
+            preempted=lambda: MoveObject.Result(
+                error_code=MoveObject.Result.PREEMPTED, error_msg="a new goal replaces this one"
+            ),
+        )
+        self.create_service(Trigger, "/supervisor/execute", self._on_execute)
+        self.create_service(Trigger, "/supervisor/cancel", self._on_cancel)
+        self.create_subscription(
+            PoseStamped, "/goal_pose", self._on_goal_pose, COMMAND,
+            event_callbacks=events("/goal_pose"),
+        )
+        self.create_subscription(
+            OccupancyGrid, "/map", self._on_map, LATCHED, event_callbacks=events("/map")
+        )
+        self.create_subscription(
+            NamedPoses, "/poses", self._on_poses, STREAM, event_callbacks=events("/poses")
+        )
+        self._watchdog = self.create_timer(
+            0.1, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
+
+    def _apply(self, settings: SupervisorSettings) -> None:
+        if self.machine.busy:
+            raise SettingsError("the supervisor is busy; change its parameters when it is idle")
+        self.settings = settings
+        self.machine.settings = settings
+
+    # Inputs
+
+    def _on_map(self, message: OccupancyGrid) -> None:
+        try:
+            grid = grid_from_ros(message)
+        except InvalidMessage as error:
+            self._diagnostics.refuse("/map", str(error))
+            return
+        self._grid = grid
+        points = grid.boundary_points(_OBSTACLE_SPACING)
+        radius = self._robot_spec.body_radius + self.settings.obstacle_margin
+        self._obstacles = np.column_stack([points, np.full(len(points), radius)])
+
+    def _on_goal_pose(self, message: PoseStamped) -> None:
+        if self._job.active:
+            self._end_job(JobError.PREEMPTED, "a goal on /goal_pose replaces this one")
+        self._take_goal(message, False, "/goal_pose")
+
+    def _on_job(self, request: Any) -> None:
+        if request.object not in ("", self.object):
+            self._refuse(JobError.UNKNOWN_OBJECT, f"unknown object '{request.object}'")
+            return
+        self._take_goal(request.goal, bool(request.plan_only), "/move_object")
+
+    def _take_goal(self, message: PoseStamped, plan_only: bool, topic: str) -> None:
+        """Check a goal before anything that is under way is given up for it."""
+        try:
+            goal = stamped_pose(message, "the goal")
+        except InvalidMessage as error:
+            self._diagnostics.refuse(topic, str(error))
+            frame = message.header.frame_id != "map"
+            code = JobError.UNKNOWN_FRAME if frame else JobError.INVALID_GOAL
+            self._refuse(code, f"goal refused: {error}")
+            return
+        if self._grid is not None and not self._grid.contains(goal[0], goal[1]):
+            self._diagnostics.refuse(topic, "the goal lies outside the map")
+            self._refuse(
+                JobError.OUTSIDE_MAP,
+                f"goal refused: ({goal[0]:.2f}, {goal[1]:.2f}) lies outside the map",
+            )
+            return
+        self._fire(Event.GOAL, goal=goal, plan_only=plan_only)
+
+    def _refuse(self, code: JobError, reason: str) -> None:
+        """Say no to a goal; a job that is under way goes on."""
+        self.get_logger().warning(reason)
+        if self.machine.busy and self._job.active:
+            return
+        self.machine.error = code
+        if not self.machine.busy:
+            self.machine.reason = reason
+        self._end_job(code, reason)
+        self._publish_state(reason)
+
+    def _on_execute(self, request: Any, response: Any) -> Any:
+        response.success = self.machine.plan_ready
+        response.message = "executing" if response.success else "there is no plan to execute"
+        self._fire(Event.EXECUTE)
+        return response
+
+    def _on_cancel(self, request: Any, response: Any) -> Any:
+        response.success = self.machine.busy or self.machine.plan_ready
+        response.message = "canceled" if response.success else "there is nothing to cancel"
+        self._cancel()
+        return response
+
+    def _cancel(self) -> None:
+        self._fire(Event.CANCEL)
+
+    def _on_poses(self, message: NamedPoses) -> None:
+        verdict = self._poses.begin(time_from_ros(message.header.stamp))
+        if message.header.frame_id != "map" or verdict is Stamp.REFUSED:
+            return
+        self._last_wall = time.monotonic()
+        for named in message.poses:
+            if named.name in (self.robot, self.object):
+                try:
+                    self._poses.accept(named.name, planar_pose(named.pose, named.name))
+                except InvalidMessage as error:
+                    self._diagnostics.refuse("/poses", str(error))
+        if verdict is Stamp.RESET:
+            self._fire(Event.CLOCK_RESET)
+        self._ticks += 1
+        if self._ticks % 5 == 0:
+            self._heartbeat_publisher.publish(Header(stamp=message.header.stamp, frame_id="map"))
+        self._retry_waiting()
+        if self._ticks % 10 == 0:
+            self._watch_displacement()
+            if self._job.active:
+                self._job.feedback(self._feedback())
+
+    def _watch_displacement(self) -> None:
+        """Whether somebody moved the object while the robot was on its way to it."""
+        machine = self.machine
+        if machine.state not in (State.POSITIONING, State.APPROACH) or not machine.segments:
+            self._displaced = 0
+            return
+        item = self._poses.pose(self.object)
+        if item is None:
+            return
+        planned = planar_pose(machine.segment.object_start)
+        local = se2.between(planned, item)
+        way, turn = float(np.hypot(local[0], local[1])), abs(float(local[2]))
+        off = way > self.settings.displacement or turn > self.settings.displacement_turn
+        self._displaced = self._displaced + 1 if off else 0
+        if self._displaced >= 3:
+            self._displaced = 0
+            self._fire(
+                Event.DISPLACED,
+                message=f"the object stands {1e3 * way:.0f} mm and {turn:.2f} rad from where the "
+                "push was to begin",
+            )
+
+    def _on_watchdog(self) -> None:
+        """Wall time: a lost controller, a silent pose stream."""
+        if time.monotonic() - self._last_wall > 0.3:
+            self._retry_waiting()
+
+    # The machine
+
+    def _fire(self, event: Event, **payload: Any) -> None:
+        """Give an event to the machine and carry out its commands, one event after the other."""
+        self._queue.append((event, payload))
+        if self._handling:
+            return
+        self._handling = True
+        try:
+            while self._queue:
+                event, payload = self._queue.pop(0)
+                before = (self.machine.state, self.machine.reason)
+                for command, arguments in self.machine.handle(event, **payload):
+                    self._carry_out(command, arguments)
+                if (self.machine.state, self.machine.reason) != before:
+                    self._publish_state()
+        finally:
+            self._handling = False
+
+    def _carry_out(self, command: Command, arguments: dict[str, Any]) -> None:
+        self._waiting = None
+        if command in (Command.STOP, Command.CANCEL_PLAN):
+            self._plan_client.forget()
+            self._follow_client.forget()
+            self._path_token += 1
+        elif command is Command.FINISH:
+            self._end_job(arguments["code"], arguments["message"])
+        else:
+            self._waiting = (command, arguments)
+            self._lost_since = None
+            self._retry_waiting()
+
+    def _retry_waiting(self) -> None:
+        """Send what waits as soon as its server is there and the poses are."""
+        if self._waiting is None:
+            self._watch_servers()
+            return
+        command, arguments = self._waiting
+        server_ready = {
+            Command.PLAN: lambda: self._plan_client.ready,
+            Command.OFFER: lambda: True,
+            Command.PATH: self._path_client.service_is_ready,
+        }.get(command, lambda: self._follow_client.ready)
+        robot, item = self._poses.pose(self.robot), self._poses.pose(self.object)
+        if robot is not None and item is not None and server_ready():
+            self._waiting = None
+            self._lost_since = None
+            self._send(command, arguments, robot, item)
+            return
+        now = time.monotonic()
+        self._lost_since = self._lost_since or now
+        if now - self._lost_since > self.settings.node_timeout:
+            self._waiting = self._lost_since = None
+            poses = robot is None or item is None
+            self._end_waiting("no poses of robot and object" if poses else "a node does not answer",
+                              JobError.POSES_STALE if poses else JobError.NODE_LOST)
+
+    def _end_waiting(self, message: str, code: JobError) -> None:
+        self._fire(Event.CANCEL)
+        self.machine.error, self.machine.reason = code, message
+        self._publish_state()
+
+    def _watch_servers(self) -> None:
+        """A controller that dies in the middle of a motion never answers."""
+        moving = self.machine.state in (
+            State.POSITIONING, State.APPROACH, State.PUSHING, State.DETACHING
+        )
+        if moving and self._ticks % 10 == 0 and not self._follow_client.ready:
+            self._follow_client.forget()
+            self._fire(Event.MOTION_FAILED, message="the controller is gone", lost=True)
+
+    def _send(
+        self, command: Command, arguments: dict[str, Any], robot: Array, item: Array
+    ) -> None:
+        if command is Command.PLAN:
+            offer = arguments["start"]
+            start = item if offer is None else planar_pose(offer.object_end)
+            self._request_plan(start, arguments["goal"])
+        elif command is Command.OFFER:
+            self._offer(item, arguments["goal"])
+        elif command is Command.PATH:
+            self._request_path(robot, item, arguments["segment"])
+        elif command is Command.FOLLOW_PATH:
+            margin = self.settings.obstacle_margin
+            reach = self._object_radius + self._robot_spec.body_radius + margin
+            circles = np.vstack([self._obstacles, [[item[0], item[1], reach]]])
+            self._follow(arguments["trajectory"], circles)
+        elif command is Command.FOLLOW_APPROACH:
+            contact = self._contact_pose(item, arguments["segment"])
+            ahead = float(se2.between(robot, contact)[0])
+            begin = se2.compose(contact, np.array([-ahead, 0.0, 0.0]))
+            self._follow(trajectory_to_ros(self._straight(begin, ahead)), None)
+        elif command is Command.FOLLOW_PUSH:
+            self._follow_push(arguments["segment"])
+        else:
+            back = self._straight(robot, -self.settings.detach_distance)
+            self._follow(trajectory_to_ros(back), None)
+
+    def _straight(self, start: Array, distance: float) -> Trajectory:
+        return line(start, distance, self.settings.approach_speed, self.settings.acceleration)
+
+    def _contact_pose(self, item: Array, segment: Any) -> Array:
+        """Where the robot touches the pushed side, the object being at ``item`` ``(3,)``."""
+        grasp = self._grasp(segment)
+        return se2.compose(item, se2.inverse(grasp))
+
+    def _grasp(self, segment: Any) -> Array:
+        return se2.between(planar_pose(segment.robot_start), planar_pose(segment.object_start))
+
+    def _request_plan(self, start: Array, goal: Array) -> None:
+        now = self._poses.stamp
+        request = PlanPush.Goal(
+            object=self.object, robot=self.robot, start=pose_stamped_to_ros(start, now),
+            goal=pose_stamped_to_ros(goal, now),
+        )
+
+        def done(result: Any) -> None:
+            if result is None:
+                self._fire(Event.PLAN_FAILED, code=JobError.PLANNING_FAILED,
+                           message="the planner rejected the request", retry=False)
+            elif result.error_code == PlanPush.Result.NONE:
+                self._fire(Event.PLANNED, segments=list(result.plan.segments))
+            else:
+                code = _PLAN_ERRORS.get(result.error_code, JobError.PLANNING_FAILED)
+                self._fire(Event.PLAN_FAILED, code=code, message=result.error_msg,
+                           retry=result.error_code in _RETRY_CODES)
+
+        self._plan_client.send(request, done)
+
+    def _offer(self, item: Array, goal: Array) -> None:
+        if self._grid is None:
+            self._fire(Event.OFFERS, segments=[])
+            return
+        self._seed += 1
+        planner = PushPlanner(
+            self._planner_settings, self._grid, self._robot_spec, self._object_spec
+        )
+        seed = self._planner_settings.seed + self._seed
+        found = preemptive_pushes(planner, item, goal, seed)
+        self._fire(Event.OFFERS, segments=[segment_to_ros(s) for s in found])
+
+    def _request_path(self, robot: Array, item: Array, segment: Any) -> None:
+        contact = self._contact_pose(item, segment)
+        standoff = se2.compose(contact, np.array([-self._planner_settings.standoff, 0.0, 0.0]))
+        reach = self._object_radius + self._robot_spec.footprint_radius
+        request = PlanRobotPath.Request(
+            start=pose_to_ros(robot), goal=pose_to_ros(standoff),
+            obstacles=circles_to_ros(np.array([[item[0], item[1], reach]])),
+        )
+        self._path_token += 1
+        token = self._path_token
+
+        def done(future: Any) -> None:
+            if token != self._path_token:
+                return
+            answer = future.result()
+            if answer is not None and answer.error_code == PlanRobotPath.Response.NONE:
+                self._fire(Event.PATH, trajectory=answer.trajectory)
+            else:
+                text = "no answer" if answer is None else answer.message
+                self._fire(Event.PATH_FAILED, message=text)
+
+        self._path_client.call_async(request).add_done_callback(done)
+
+    def _follow(self, trajectory: Any, circles: Array | None) -> None:
+        goal = FollowTrajectory.Goal(
+            mode=FollowTrajectory.Goal.MOVE, trajectory=trajectory,
+            obstacles=[] if circles is None else circles_to_ros(self._near(circles, trajectory)),
+            heartbeat_timeout=self.settings.heartbeat_timeout,
+        )
+        self._send_follow(goal)
+
+    def _follow_push(self, segment: Any) -> None:
+        goal = FollowTrajectory.Goal(
+            mode=FollowTrajectory.Goal.PUSH, object=self.object, trajectory=segment.trajectory,
+            contact=pose_to_ros(self._grasp(segment)), curvature_min=segment.curvature_min,
+            curvature_max=segment.curvature_max,
+            obstacles=circles_to_ros(self._near(self._obstacles, segment.trajectory)),
+            heartbeat_timeout=self.settings.heartbeat_timeout,
+        )
+        self._send_follow(goal)
+
+    def _near(self, circles: Array, trajectory: Any) -> Array:
+        """The circles within reach of a trajectory message."""
+        path = np.column_stack([trajectory.x, trajectory.y])[::5]
+        gap = np.hypot(
+            circles[:, None, 0] - path[None, :, 0], circles[:, None, 1] - path[None, :, 1]
+        ).min(axis=1)
+        return circles[gap < 0.4 + circles[:, 2]]
+
+    def _send_follow(self, goal: Any) -> None:
+        def done(result: Any) -> None:
+            if result is None:
+                self._fire(Event.MOTION_FAILED, message="the controller rejected the trajectory")
+            elif result.error_code == FollowTrajectory.Result.NONE:
+                self._fire(Event.MOTION_DONE)
+            elif result.error_code == FollowTrajectory.Result.CLOCK_RESET:
+                self._fire(Event.CLOCK_RESET)
+            else:
+                self._fire(Event.MOTION_FAILED, message=result.error_msg)
+
+        self._follow_client.send(goal, done)
+
+    # Outputs
+
+    def _errors(self, goal: Any) -> tuple[float, float]:
+        item = self._poses.pose(self.object)
+        if item is None or goal is None:
+            return float("inf"), float("inf")
+        local = se2.between(goal, item)
+        return float(np.hypot(local[0], local[1])), abs(float(local[2]))
+
+    def _at_goal(self, goal: Any) -> tuple[bool, str]:
+        way, turn = self._errors(goal)
+        s = self.settings
+        there = way <= s.position_tolerance and turn <= s.orientation_tolerance
+        return there, f"{1e3 * way:.1f} mm, {turn:.3f} rad"
+
+    def _end_job(self, code: JobError, message: str) -> None:
+        self._plan_client.forget()
+        self._follow_client.forget()
+        if not self._job.active:
+            return
+        way, turn = self._errors(self.machine.goal)
+        self._job.finish(
+            MoveObject.Result(
+                error_code=int(code), error_msg=message, position_error=way,
+                orientation_error=turn, pushes=self.pushes, replans=self.machine.replans,
+            ),
+            success=code is JobError.NONE,
+        )
+
+    @property
+    def pushes(self) -> int:
+        """Pushes of the current plan."""
+        return len(self.machine.segments)
+
+    def _feedback(self) -> Any:
+        way, _ = self._errors(self.machine.goal)
+        m = self.machine
+        return MoveObject.Feedback(
+            state=int(m.state), state_name=m.state.name, push_index=m.index,
+            push_count=len(m.segments), distance_to_goal=way,
+        )
+
+    def _publish_state(self, reason: str = "") -> None:
+        m = self.machine
+        message = SupervisorState(
+            state=int(m.state), state_name=m.state.name, reason=reason or m.reason,
+            error_code=int(m.error), plan_ready=m.plan_ready, push_index=m.index,
+            push_count=len(m.segments), replans=m.replans,
+        )
+        message.header.frame_id = "map"
+        message.header.stamp = pose_stamped_to_ros(np.zeros(3), self._poses.stamp).header.stamp
+        if m.goal is not None:
+            message.goal = pose_stamped_to_ros(m.goal, self._poses.stamp)
+        self._state_publisher.publish(message)
+        self._text_publisher.publish(String(data=f"{m.state.name}: {message.reason}"))
+        self.get_logger().info(f"{m.state.name}: {message.reason}")
+
+    def _diagnose(self) -> dict[str, Any]:
+        m = self.machine
+        return {
+            "state": m.state.name, "reason": m.reason, "error code": int(m.error),
+            "replans": m.replans, "poses refused": self._poses.refused,
+            "pose jumps": self._poses.jumps,
+            "warning": "no poses" if self._poses.pose(self.object) is None else "",
+        }
+
