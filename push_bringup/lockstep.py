@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import rclpy
 from geometry_msgs.msg import PoseStamped
+from rclpy.logging import LoggingSeverity, set_logger_level
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
@@ -115,9 +116,22 @@ class Observer(Node):
 class LockstepRun:
     """The graph of a scenario in this process. Use it as a context manager."""
 
-    def __init__(self, scenario: Scenario, extra: Callable[[], list[Node]] | None = None) -> None:
-        """extra makes further nodes, e.g. a recorder, once ROS is up."""
+    def __init__(
+        self, scenario: Scenario, extra: Callable[[], list[Node]] | None = None,
+        world: Scenario | None = None, quiet: bool = False,
+    ) -> None:
+        """Make the nodes.
+
+        Parameters
+        ----------
+        scenario: what planner, controller and supervisor believe.
+        extra: makes further nodes, e.g. a recorder, once ROS is up.
+        world: what the bridge simulates, when it differs from what is believed.
+        quiet: log warnings only.
+        """
         prepare_environment()
+        if quiet:
+            set_logger_level("", LoggingSeverity.WARN)
         os.environ.setdefault("ROS_DOMAIN_ID", str(100 + os.getpid() % 100))
         if not rclpy.ok():
             rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
@@ -125,10 +139,11 @@ class LockstepRun:
         else:
             self._owns_context = False
         self.scenario = scenario.settings("bridge", lockstep=True)
+        simulated = (world or scenario).settings("bridge", lockstep=True)
         self.spinner: Spinner | None = None
         nodes: list[Node] = []
         try:
-            self.bridge = BridgeNode(self.scenario, autostart=False)
+            self.bridge = BridgeNode(simulated, autostart=False)
             nodes.append(self.bridge)
             self.controller = ControllerNode(self.scenario)
             nodes.append(self.controller)

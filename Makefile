@@ -1,0 +1,50 @@
+# make demo and make test set up everything they need, and do it once.
+PYTHON := $(shell for p in python3.11 python3.12 python3.13 python3; do \
+  $$p -c 'import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 14))' \
+  >/dev/null 2>&1 && echo $$p && break; done)
+VENV ?= .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+INTERFACES := $(VENV)/.interfaces
+export OPENBLAS_NUM_THREADS = 1
+export ROS_AUTOMATIC_DISCOVERY_RANGE = LOCALHOST
+
+.PHONY: install demo test lint clean
+install: $(STAMP)
+
+$(VENV)/bin/python:
+	@test -n "$(PYTHON)" || { echo "Python 3.11, 3.12 or 3.13 with venv is needed; set PYTHON=..."; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install -q --upgrade "pip==25.2"
+
+# The interfaces are wheels of their own. tf2_msgs is built only where no ROS brings it.
+$(INTERFACES): $(VENV)/bin/python constraints.txt $(shell find push_msgs tf2_msgs -type f)
+	@echo "building the message packages (about a minute)"
+	$(BIN)/python -m pip install -q -c constraints.txt "ros-jazzy-rclpy[fastrtps]" ros-jazzy-common-interfaces
+	$(BIN)/python -m pip install -q --force-reinstall --no-deps ./push_msgs
+	$(BIN)/python -c "import tf2_msgs.msg" 2>/dev/null || \
+	  $(BIN)/python -m pip install -q --no-deps ./tf2_msgs
+	@touch $@
+
+$(STAMP): $(INTERFACES) pyproject.toml constraints.txt
+	@echo "installing the suite (a minute; three more where PyBullet must be compiled)"
+	$(BIN)/python -m pip install -q "setuptools==80.9.0" "wheel==0.45.1" -c constraints.txt "numpy>=2,<2.5"
+	$(BIN)/python -m pip install -q -c constraints.txt --no-build-isolation -e ".[dev]"
+	$(BIN)/planar-push warm-up
+	@touch $@
+
+demo: $(STAMP)
+	$(BIN)/planar-push demo --out results/demo
+
+test: $(STAMP)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check . || true
+	$(BIN)/mypy
+	$(BIN)/python -m pytest
+
+lint: $(STAMP)
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+clean:
+	rm -rf $(VENV) results build *.egg-info

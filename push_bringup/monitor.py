@@ -1,0 +1,92 @@
+"""A small ROS client for people: sends a goal, shows what the supervisor does."""
+
+import sys
+import time
+from collections.abc import Callable
+
+import numpy as np
+import rclpy
+from geometry_msgs.msg import PoseStamped
+from nav_msgs.msg import OccupancyGrid
+from rclpy.signals import SignalHandlerOptions
+
+from push_msgs.msg import NamedPoses, SupervisorState
+from push_ros.conversions import pose_stamped_to_ros
+from push_ros.process import Spinner, prepare_environment
+from push_ros.qos import COMMAND, LATCHED, STREAM
+
+
+class Monitor:
+    """Use it as a context manager; it owns its ROS context."""
+
+    def __enter__(self) -> "Monitor":
+        prepare_environment()
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        self._node = rclpy.create_node("monitor")
+        self._state: SupervisorState | None = None
+        self._position: tuple[float, float] | None = None
+        self._map = False
+        self._news = 0
+        self._goal: tuple[float, float, float] | None = None
+        self._publisher = self._node.create_publisher(PoseStamped, "/goal_pose", COMMAND)
+        self._node.create_subscription(SupervisorState, "/supervisor/state", self._on_state, LATCHED)
+        self._node.create_subscription(OccupancyGrid, "/map", self._on_map, LATCHED)
+        self._node.create_subscription(NamedPoses, "/poses", self._on_poses, STREAM)
+        self._spinner = Spinner([self._node])
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._spinner.close()
+        rclpy.try_shutdown()
+
+    def _on_state(self, message: SupervisorState) -> None:
+        self._state = message
+        self._news += 1
+        if self._goal is not None:
+            print(f"  {message.state_name.lower():12s} {message.reason}", flush=True)
+
+    def _on_map(self, message: OccupancyGrid) -> None:
+        self._map = True
+
+    def _on_poses(self, message: NamedPoses) -> None:
+        if len(message.poses) >= 2:
+            p = message.poses[-1].pose.position
+            self._position = (p.x, p.y)
+
+    def connect(self, limit: float, alive: Callable[[], bool] = lambda: True) -> bool:
+        """Wait for supervisor, map and poses; False after limit [s] or when not alive."""
+        end = time.monotonic() + limit
+        while time.monotonic() < end and alive():
+            ready = (
+                self._state is not None and self._map and self._position is not None
+                and self._node.count_subscribers("/goal_pose") > 0
+                and self._node.count_publishers("/supervisor/state") > 0
+            )
+            if ready:
+                return True
+            self._spinner.once(0.05)
+        return False
+
+    def send_goal(self, goal: tuple[float, float, float]) -> None:
+        """Publish a goal (x, y, theta) [m, m, rad]."""
+        self._goal = goal
+        self._news = 0
+        self._publisher.publish(pose_stamped_to_ros(np.array(goal), 0.0))
+
+    def follow(self, limit: float, alive: Callable[[], bool]) -> int:
+        """Show progress until the job ends; 0 on success, 1 otherwise."""
+        assert self._goal is not None
+        end = time.monotonic() + limit
+        shown = 0.0
+        while time.monotonic() < end and alive():
+            self._spinner.once(0.1)
+            state = self._state
+            if self._news and state is not None and state.state == SupervisorState.IDLE:
+                return 0 if state.error_code == 0 else 1
+            if time.monotonic() - shown > 2.0 and self._position is not None:
+                shown = time.monotonic()
+                gap = np.hypot(self._position[0] - self._goal[0], self._position[1] - self._goal[1])
+                print(f"  {gap:6.3f} m to go", flush=True)
+        print("error: the job did not end in time" if alive() else "error: a node died",
+              file=sys.stderr)
+        return 1
