@@ -84,8 +84,10 @@ class RecorderNode(Node):
         self._sim_time = round(1e9 * time_from_ros(message.clock))
 
     def _on_message(self, topic: str, data: bytes) -> None:
-        if not self.writer.closed:
-            self.writer.write(topic, self._sim_time or time.time_ns(), bytes(data))
+        if self.writer.closed:
+            return
+        simulated = self._sim_time > 0 or self.count_publishers("/clock") > 0
+        self.writer.write(topic, self._sim_time if simulated else time.time_ns(), bytes(data))
 
     def destroy_node(self) -> None:
         """Finish the bag too."""

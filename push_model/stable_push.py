@@ -98,7 +98,11 @@ def contact_margins(
     edge margin: [m] distance of the line of force to the nearer end, negative when outside.
     """
     x, y = axle_distance + contact.centre[0], contact.centre[1]
-    fx, fy, torque = surface.wrench(np.array([1.0 - curvature * y, curvature * x, curvature]))
+    vx, vy = 1.0 - curvature * y, curvature * x
+    # The limit surface is the object's own: ask it in the object's frame.
+    c, s = math.cos(contact.heading), math.sin(contact.heading)
+    ox, oy, torque = surface.wrench(np.array([c * vx + s * vy, -s * vx + c * vy, curvature]))
+    fx, fy = c * ox - s * oy, s * ox + c * oy
     if fx <= 0.0:
         return -math.inf, -math.inf
     at = contact.centre[1] - (contact.centre[0] * fy + torque) / fx

@@ -55,7 +55,7 @@ def _ramp(distance: float, top: float, acceleration: float, step: float) -> tupl
     rise = peak / acceleration
     cruise = max(0.0, distance / peak - rise)
     total = 2.0 * rise + cruise
-    t = np.linspace(0.0, total, max(3, math.ceil(total / step) + 1))
+    t = np.linspace(0.0, total, max(9, math.ceil(total / step) + 1))
     back = total - t
     way = np.where(
         t < rise,

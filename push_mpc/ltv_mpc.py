@@ -73,6 +73,7 @@ class LtvMpc:
         """Forget the previous solution."""
         self._nominal = np.zeros((self.settings.horizon, 2))
         self._previous = np.zeros(2)
+        self._active = np.zeros(0, dtype=np.int64)  # rows that bound the previous solution
 
     def solve(
         self, error: Array, reference: Reference, limits: CurvatureLimits | None, circles: Array
@@ -131,6 +132,7 @@ class LtvMpc:
             )
             return (result.z if result.solved else None), result.status
         self._chosen[:] = False
+        self._chosen[self._active[self._active < rows]] = True
         for _ in range(_ROUNDS):
             index = np.flatnonzero(self._chosen[:rows])
             result = self._solver.solve(
@@ -139,6 +141,8 @@ class LtvMpc:
             if not result.solved:
                 return None, result.status
             if violated(self._G, self._b, rows, result.z, _TOLERANCE, self._chosen) == 0:
+                tight = self._G[index] @ result.z >= self._b[index] - _TOLERANCE
+                self._active = index[tight]
                 return result.z, result.status
         result = self._solver.solve(
             self._H, self._f, self._G[:rows], self._b[:rows], self._low, self._high

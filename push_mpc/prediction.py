@@ -66,7 +66,7 @@ def discretise(theta: float, v: float, od: float, h: float, A: Any, B: Any) -> N
     s3 = complex(0.0, 0.0)
     power = complex(1.0, 0.0)
     factorial = 1.0
-    for n in range(9):
+    for n in range(14):
         f1 = factorial * (n + 1)
         f2 = f1 * (n + 2)
         s1 += power / f1

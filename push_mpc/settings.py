@@ -12,7 +12,7 @@ class MpcSettings:
 
     step: float = bounded(0.1, low=0.01, high=1.0, doc="[s] T_s of the prediction")
     horizon: int = bounded(20, low=2, high=100, doc="p, steps predicted")
-    state_weight: tuple[float, float, float, float, float] = (40.0, 60.0, 4.0, 0.5, 0.05)
+    state_weight: tuple[float, float, float, float, float] = (40.0, 60.0, 1.0, 0.5, 0.02)
     terminal_factor: float = bounded(5.0, low=0.0, high=1000.0, doc="P = factor * Q")
     input_weight: tuple[float, float] = (0.05, 0.002)
     input_rate_weight: tuple[float, float] = (0.05, 0.002)
@@ -23,8 +23,8 @@ class MpcSettings:
         6.0, low=0.001, high=500.0, doc="[rad/s^2] per step"
     )
     max_obstacles: int = bounded(20, low=0, high=200, doc="nearest obstacles in the QP")
-    slack_linear: float = bounded(20.0, low=0.0, high=1e6, doc="price of a softened row")
-    slack_quadratic: float = bounded(2000.0, low=0.0, high=1e8, doc="price of a softened row")
+    slack_linear: float = bounded(1000.0, low=0.0, high=1e6, doc="price of a softened row")
+    slack_quadratic: float = bounded(20000.0, low=0.0, high=1e8, doc="price of a softened row")
     max_slack: float = bounded(0.3, low=0.0, high=100.0, doc="violation that counts as infeasible")
     backend: Literal["daqp", "osqp"] = "daqp"
 

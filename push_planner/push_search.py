@@ -72,10 +72,14 @@ class PushSearch:
         settings = self.scene.settings
         points, headings, way = waypoints(self.guide, settings.waypoint_spacing)
         poses = self._poses(points, headings, settings)
-        last = len(points) - 1
+        last = len(poses) - 1
         root = _Node(self.goal, (last, -1), None, 0.0, math.inf)
         counter = itertools.count()
-        queue = [(way[last], next(counter), root)]
+        # h of (2.11); for the straight runs off Gamma, the distance to the start
+        rest = [np.zeros(1), self._distances(poses[1]), *(np.full(len(p), w) for p, w in
+                zip(poses[2:-2], way[1:-1], strict=True)), self._distances(poses[-2]),
+                np.full(1, way[-1])]
+        queue = [(float(way[-1]), next(counter), root)]
         settled: set[tuple[int, int, int]] = set()
         while queue and self.statistics.expanded < settings.max_expansions:
             estimate, _, node = heapq.heappop(queue)
@@ -93,10 +97,28 @@ class PushSearch:
                 self.statistics.generated += 1
                 key = (*child.place, child.side.index if child.side else -1)
                 if key not in settled:
-                    heapq.heappush(
-                        queue, (child.cost + way[child.place[0]], next(counter), child)
-                    )
+                    h = float(rest[child.place[0]][child.place[1]])
+                    heapq.heappush(queue, (child.cost + h, next(counter), child))
             yield
+
+    def _distances(self, poses: list[Array]) -> Array:
+        return np.array([np.hypot(*(p - self.start)[:2]) for p in poses])
+
+    def _runs(self, pose: Array, sign: float) -> list[Array]:
+        """Object poses a straight push before (sign -1) or after (+1) a pose, on every side.
+
+        Off Gamma, but through them most pushes leave the start and reach the goal: curves are wide,
+        and the first and last heading are given.
+        """
+        settings = self.scene.settings
+        result = []
+        for side in self.scene.sides:
+            heading = float(pose[2]) - side.contact.heading
+            for length in settings.run_lengths:
+                place = pose + sign * length * np.array([math.cos(heading), math.sin(heading), 0.0])
+                if self.scene.object_clearance(place) >= settings.safety_distance:
+                    result.append(place)
+        return result
 
     def _poses(self, points: Array, headings: Array, settings: PlannerSettings) -> list[list[Array]]:
         """Object poses at each waypoint: one of its sides faces along Gamma, or nearly so."""
@@ -110,10 +132,13 @@ class PushSearch:
             for angle in angles:
                 if all(abs(se2.wrap(angle - other)) > 0.05 for other in distinct):
                     distinct.append(angle)
-            candidates = [np.array([point[0], point[1], angle]) for angle in distinct]
+            aside = np.array([-math.sin(heading), math.cos(heading)])
+            places = [point + offset * aside for offset in settings.lateral_offsets]
+            candidates = [np.array([x, y, angle]) for x, y in places for angle in distinct]
             least = settings.safety_distance
             result.append([p for p in candidates if self.scene.object_clearance(p) >= least])
-        return [*result, [self.goal]]
+        before, after = self._runs(self.start, 1.0), self._runs(self.goal, -1.0)
+        return [result[0], before, *result[1:], after, [self.goal]]
 
     def _successors(self, node: _Node, poses: list[list[Array]]) -> Iterator[_Node]:
         """Algorithm 2: pushes that end at the node, from the farthest waypoints that have any."""

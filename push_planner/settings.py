@@ -15,11 +15,13 @@ class PlannerSettings:
     rrt_iterations: int = bounded(1200, low=50, high=200000, doc="RRT* iterations per threshold")
     rrt_range: float = bounded(0.3, low=0.02, high=5.0, doc="[m] longest RRT* extension")
     waypoint_spacing: float = bounded(0.3, low=0.02, high=5.0, doc="[m] between waypoints on Gamma")
-    heading_offsets: tuple[float, ...] = (0.0, 0.6, -0.6)
+    heading_offsets: tuple[float, ...] = (0.0, 0.5, -0.5, 1.0, -1.0)
+    lateral_offsets: tuple[float, ...] = (0.0, 0.25, -0.25)
+    run_lengths: tuple[float, ...] = (0.15, 0.3, 0.6)
     successor_waypoints: int = bounded(
         2, low=1, high=50, doc="waypoints with a feasible push before Algorithm 2 stops looking"
     )
-    max_expansions: int = bounded(150, low=1, high=100000, doc="nodes that A* may expand")
+    max_expansions: int = bounded(60, low=1, high=100000, doc="nodes that A* may expand")
     side_change_cost: float = bounded(0.3, low=0.0, high=10.0, doc="[m] added for a change of side")
     friction_trust: float = bounded(
         0.75, low=0.1, high=1.0, doc="fraction of the stable curvature that plans may use"
@@ -40,5 +42,5 @@ class PlannerSettings:
     def __post_init__(self) -> None:
         if self.length_weight == 0.0 and self.clearance_weight == 0.0:
             raise SettingsError("length_weight and clearance_weight must not both be 0")
-        if not self.heading_offsets:
-            raise SettingsError("heading_offsets needs at least one value")
+        if not self.heading_offsets or not self.lateral_offsets:
+            raise SettingsError("heading_offsets and lateral_offsets need at least one value")

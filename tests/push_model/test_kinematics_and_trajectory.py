@@ -1,0 +1,75 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from push_model import (
+    DifferentialDrive,
+    along_curve,
+    concatenate,
+    line,
+    point_velocity_to_twist,
+    rotation,
+    unicycle_step,
+)
+
+DRIVE = DifferentialDrive(0.0205, 0.0265, 6.28)
+
+
+@given(st.floats(-1, 1), st.floats(-20, 20))
+def test_saturation_keeps_curvature_and_respects_the_wheels(v, omega):
+    sv, so = DRIVE.saturate(v, omega)
+    assert max(abs(w) for w in DRIVE.wheel_speeds(sv, so)) <= 6.28 * (1 + 1e-12)
+    assert sv * omega == pytest.approx(so * v, abs=1e-9)
+    assert DRIVE.twist(*DRIVE.wheel_speeds(v, omega)) == pytest.approx((v, omega), abs=1e-9)
+
+
+@given(st.floats(-1, 1), st.floats(-3, 3), st.floats(0.001, 2))
+def test_unicycle_step_is_the_integral(v, omega, dt):
+    state = np.zeros(3)
+    n = 400
+    for _ in range(n):  # mid-point rule
+        middle = state[2] + 0.5 * omega * dt / n
+        state = state + dt / n * np.array([v * math.cos(middle), v * math.sin(middle), omega])
+    exact = unicycle_step(np.zeros(3), v, omega, dt)
+    assert exact[:2] == pytest.approx(state[:2], abs=1e-4)
+
+
+@given(st.floats(-3, 3), st.floats(0.02, 0.5), st.floats(-1, 1), st.floats(-1, 1))
+def test_linearisation_moves_the_point_as_asked(theta, offset, vx, vy):
+    v, omega = point_velocity_to_twist(np.array([vx, vy]), theta, offset)
+    c, s = math.cos(theta), math.sin(theta)
+    assert v * c - omega * offset * s == pytest.approx(vx, abs=1e-9)
+    assert v * s + omega * offset * c == pytest.approx(vy, abs=1e-9)
+
+
+@pytest.mark.parametrize("distance", [0.5, -0.3, 0.001])
+def test_line_ends_at_rest_where_it_should(distance):
+    t = line(np.array([1.0, 2.0, 0.5]), distance, 0.1, 0.2)
+    end = [1.0 + distance * math.cos(0.5), 2.0 + distance * math.sin(0.5), 0.5]
+    assert t.pose[-1] == pytest.approx(end)
+    assert t.twist[0] == pytest.approx([0, 0]) and t.twist[-1] == pytest.approx([0, 0])
+    assert np.abs(t.twist[:, 0]).max() <= 0.1 + 1e-12
+    way = np.trapezoid(t.twist[:, 0], t.time)
+    assert way == pytest.approx(distance, rel=0.02, abs=1e-4)
+
+
+def test_curve_respects_wheels_and_acceleration():
+    angle = np.linspace(0, math.pi / 2, 200)
+    points = 0.2 * np.column_stack([np.sin(angle), 1 - np.cos(angle)])
+    t = along_curve(points, angle, np.full(200, 5.0), DRIVE, 0.12, 0.1)
+    wheel = np.abs(t.twist[:, 0]) + 0.0265 * np.abs(t.twist[:, 1])
+    assert wheel.max() <= DRIVE.max_speed + 1e-9
+    assert np.abs(np.diff(t.twist[:, 0]) / np.diff(t.time)).max() <= 0.1 * 1.2
+    assert t.twist[-1] == pytest.approx([0, 0])
+
+
+def test_concatenated_heading_is_continuous():
+    a = rotation(np.array([0, 0, 3.0]), 0.5, 1.0, 2.0)
+    b = line(np.array([0, 0, 3.5 - 2 * math.pi]), 0.2, 0.1, 0.1)
+    t = concatenate([a, b])
+    assert np.abs(np.diff(t.pose[:, 2])).max() < 0.2
+    pose, twist = t.sample(np.array([-1.0, t.duration + 1.0]))
+    assert pose[1] == pytest.approx(t.pose[-1]) and not twist.any()

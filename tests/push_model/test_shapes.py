@@ -1,0 +1,59 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from push_model import SettingsError, ellipse, flower, polygon, rectangle, shape_from_mapping
+
+
+def test_rectangle_against_textbook():
+    r = rectangle(0.3, 0.2)
+    assert r.area == pytest.approx(0.06)
+    assert r.inertia_per_mass == pytest.approx((0.3**2 + 0.2**2) / 12)
+    assert r.inradius == pytest.approx(0.1)
+    assert r.circumradius == pytest.approx(math.hypot(0.15, 0.1))
+    side = r.sides[0]
+    assert side.inward_normal == pytest.approx([1.0, 0.0])
+    assert side.distance == pytest.approx(0.15)
+    assert side.length == pytest.approx(0.2)
+
+
+def test_ellipse_against_textbook():
+    e = ellipse(0.25, 0.17)
+    assert e.area == pytest.approx(math.pi * 0.25 * 0.17, rel=1e-9)
+    assert e.inertia_per_mass == pytest.approx((0.25**2 + 0.17**2) / 4, rel=2e-3)
+    assert e.sides == () and e.convex
+
+
+def test_flower_area_and_concavity():
+    f = flower(0.2, 0.04, 5)
+    assert f.area == pytest.approx(math.pi * (0.2**2 + 0.04**2 / 2), rel=1e-3)
+    assert not f.convex
+
+
+@given(st.lists(st.tuples(st.floats(-1, 1), st.floats(-1, 1)), min_size=3, max_size=7))
+def test_polygons_are_centred_counterclockwise_or_refused(vertices):
+    try:
+        shape = polygon(np.array(vertices))
+    except SettingsError:
+        return
+    assert shape.area > 0
+    if shape.area < 1e-3:
+        return  # too thin for the rounding of a second pass
+    again = polygon(shape.outline + 3.0)
+    assert np.allclose(again.outline, shape.outline, atol=1e-7)
+    assert shape.inertia_per_mass > 0
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [{}, {"polygon": {"vertices": [[0, 0], [1, 1]]}}, {"circle": {"radius": 1}},
+     {"rectangle": {"length": -1, "width": 1}}, {"flower": {"radius": 1, "amplitude": 2,
+                                                            "petals": 5}},
+     {"polygon": {"vertices": [[0, 0], [1, 1], [1, 0], [0, 1]]}}, "box", 3],
+)
+def test_bad_shapes_are_refused(bad):
+    with pytest.raises(SettingsError):
+        shape_from_mapping(bad)

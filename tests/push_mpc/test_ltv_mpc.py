@@ -1,0 +1,168 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from push_model import CurvatureLimits, DifferentialDrive
+from push_mpc import (
+    DaqpBackend,
+    LtvMpc,
+    MpcSettings,
+    OsqpBackend,
+    QpSolution,
+    Reference,
+)
+
+DRIVE = DifferentialDrive(0.0205, 0.0265, 6.28)
+LIMITS = CurvatureLimits(-2.0, 2.0)
+NONE = np.zeros((0, 3))
+
+
+def straight(p=20, v=0.07, h=0.1):
+    t = np.arange(p + 1) * h
+    return Reference(
+        np.column_stack([v * t, 0 * t, 0 * t]), np.column_stack([0 * t + v, 0 * t, 0 * t])
+    )
+
+
+@pytest.mark.parametrize("name", ["daqp", "osqp"])
+def test_backends_agree_with_a_dense_reference(name):
+    from push_mpc import backend
+
+    random = np.random.default_rng(1)
+    solver = OsqpBackend(1e-8) if name == "osqp" else backend(name)
+    for _ in range(20):
+        n, m = 8, 12
+        root = random.normal(size=(n, n))
+        H, f = root @ root.T + np.eye(n), random.normal(size=n) * 5
+        G, b = random.normal(size=(m, n)), random.uniform(0.1, 1, m)
+        low, high = np.full(n, -1.0), np.full(n, 1.0)
+        from scipy.optimize import minimize
+
+        other = minimize(
+            lambda z, H=H, f=f: 0.5 * z @ H @ z + f @ z, np.zeros(n),
+            jac=lambda z, H=H, f=f: H @ z + f, bounds=[(-1, 1)] * n, method="SLSQP",
+            constraints={"type": "ineq", "fun": lambda z, G=G, b=b: b - G @ z},
+            options={"ftol": 1e-14, "maxiter": 500},
+        )
+        ours = solver.solve(H, f, G, b, low, high)
+        assert ours.solved
+        assert 0.5 * ours.z @ H @ ours.z + f @ ours.z <= other.fun + 1e-5
+        assert (G @ ours.z - b).max() < 1e-5
+
+
+def run(mpc, error, limits, steps=80, circles=NONE, v=0.07):
+    """The closed loop with the exact model, on a straight line."""
+    state = np.array([error[0], error[1], error[2], v, 0.0])
+    rows = []
+    for k in range(steps):
+        x0 = v * 0.1 * k
+        reference = straight(v=v)
+        reference = Reference(reference.pose + [x0, 0, 0], reference.twist)
+        e = state - [x0, 0, 0, v, 0]
+        result = mpc.solve(e, reference, limits, circles)
+        assert result.solved, result.reason
+        state[3] += 0.1 * result.acceleration[0]
+        state[4] += 0.1 * result.acceleration[1]
+        for _ in range(10):
+            state[0] += 0.01 * state[3] * np.cos(state[2])
+            state[1] += 0.01 * state[3] * np.sin(state[2])
+            state[2] += 0.01 * state[4]
+        rows.append([*state, result.slack])
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("offset", [0.05, -0.05])
+def test_pushing_converges_within_the_stick_limits(offset):
+    """Fig. 2.23: from an offset on either side back to the line, never beyond the curvature."""
+    mpc = LtvMpc(MpcSettings(), DRIVE)
+    rows = run(mpc, np.array([0.0, offset, 0.0]), LIMITS, steps=120)
+    assert abs(rows[-1, 1]) < 2e-3
+    assert (np.abs(rows[:, 4]) <= 2.0 * rows[:, 3] + 1e-4).all()
+    assert (rows[:, 3] >= -1e-6).all()
+
+
+def test_without_the_constraint_it_would_slip():
+    rows = run(LtvMpc(MpcSettings(), DRIVE), np.array([0.0, 0.05, 0.0]), None, steps=60)
+    assert (np.abs(rows[:, 4]) > 2.0 * rows[:, 3]).any()
+
+
+def test_wheel_speeds_are_respected():
+    rows = run(LtvMpc(MpcSettings(), DRIVE), np.array([-0.05, 0.05, 0.5]), None, v=0.1)
+    wheel = np.abs(rows[:, 3]) + 0.0265 * np.abs(rows[:, 4])
+    assert wheel.max() <= DRIVE.max_speed * 1.01
+
+
+def test_obstacle_beside_the_line_is_avoided():
+    circle = np.array([[0.3, 0.02, 0.08]])
+    rows = run(LtvMpc(MpcSettings(), DRIVE), np.zeros(3), None, 90, circle)
+    gap = np.hypot(rows[:, 0] - 0.3, rows[:, 1] - 0.02)
+    assert gap.min() > 0.08 - 5e-3
+    straight_gap = abs(0.02)
+    assert straight_gap < 0.08  # without avoidance it would have gone through
+
+
+def test_softened_rows_give_the_least_violation():
+    """FAULTS 5: already inside an obstacle there is a solution, and it leads out."""
+    circle = np.array([[0.05, 0.0, 0.08]])
+    mpc = LtvMpc(replace(MpcSettings(), max_slack=1.0), DRIVE)
+    result = mpc.solve(np.zeros(5), straight(v=0.0), None, circle)
+    assert result.solved and result.slack > 0.01
+    assert result.acceleration[0] < 0.0
+
+
+def test_violation_beyond_the_bound_is_a_failure():
+    mpc = LtvMpc(replace(MpcSettings(), max_slack=0.001), DRIVE)
+    result = mpc.solve(np.zeros(5), straight(v=0.0), None, np.array([[0.05, 0.0, 0.08]]))
+    assert not result.solved and "violated" in result.reason
+
+
+class Liar:
+    """FAULTS 4: answers 'optimal' with NaN."""
+
+    row_generation = True
+
+    def __init__(self):
+        self.honest, self.lying = DaqpBackend(), True
+
+    def solve(self, H, f, G, b, low, high):
+        if self.lying:
+            z = np.full(len(f), np.nan)
+            return QpSolution(z, bool(np.isfinite(z).all()), "optimal")
+        return self.honest.solve(H, f, G, b, low, high)
+
+
+def test_nan_from_the_solver_is_a_failure_and_the_next_good_tick_recovers():
+    solver = Liar()
+    mpc = LtvMpc(MpcSettings(), DRIVE, solver)
+    bad = mpc.solve(np.full(5, 0.01), straight(), LIMITS, NONE)
+    assert not bad.solved and bad.acceleration == (0.0, 0.0)
+    solver.lying = False
+    good = mpc.solve(np.full(5, 0.01), straight(), LIMITS, NONE)
+    assert good.solved and np.isfinite(good.acceleration).all()
+
+
+@pytest.mark.parametrize("where", ["error", "pose", "twist"])
+def test_nan_input_is_a_failure_that_leaves_no_trace(where):
+    mpc, clean = LtvMpc(MpcSettings(), DRIVE), LtvMpc(MpcSettings(), DRIVE)
+    error, reference = np.full(5, 0.01), straight()
+    if where == "error":
+        error = np.full(5, np.nan)
+    elif where == "pose":
+        reference = Reference(reference.pose * np.nan, reference.twist)
+    else:
+        reference = Reference(reference.pose, reference.twist * np.inf)
+    assert not mpc.solve(error, reference, LIMITS, NONE).solved
+    after = mpc.solve(np.full(5, 0.01), straight(), LIMITS, NONE)
+    assert after.acceleration == clean.solve(np.full(5, 0.01), straight(), LIMITS, NONE).acceleration
+
+
+def test_half_plane_of_2_60_needs_the_unit_normal():
+    """Errata (2.59): printed, q lacks the obstacle's centre; corrected, n'p <= n'o - delta."""
+    o, delta, p = np.array([1.0, 0.5]), 0.2, np.array([0.2, 0.1])
+    printed = delta * (p - o) / np.linalg.norm(p - o)
+    corrected = o + printed
+    assert np.linalg.norm(corrected - o) == pytest.approx(delta)
+    assert np.linalg.norm(printed - o) > 2 * delta
+    n = (o - p) / np.linalg.norm(o - p)
+    assert (corrected - p) / np.linalg.norm(corrected - p) == pytest.approx(n)

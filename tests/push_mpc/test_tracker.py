@@ -1,0 +1,161 @@
+"""The tracker in closed loop with ideal kinematics, and everything that can go wrong."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from push_model import CurvatureLimits, DifferentialDrive, line, se2, unicycle_step
+from push_mpc import (
+    LtvMpc,
+    MpcSettings,
+    Push,
+    QpSolution,
+    Task,
+    TrackerSettings,
+    TrackError,
+    TrajectoryTracker,
+)
+
+DRIVE = DifferentialDrive(0.0205, 0.0265, 6.28)
+GRASP = np.array([0.095, 0.0, 0.0])
+NONE = np.zeros((0, 3))
+
+
+def make(settings=None, solver=None):
+    return TrajectoryTracker(settings or TrackerSettings(), LtvMpc(MpcSettings(), DRIVE, solver))
+
+
+def task(distance=0.4, push=True, circles=NONE):
+    trajectory = line(np.zeros(3), distance, 0.07, 0.05)
+    return Task(trajectory, Push(GRASP, CurvatureLimits(-2.1, 2.1)) if push else None, circles,
+                0.006, 0.03)
+
+
+def drive(tracker, robot, seconds, item=lambda t, r: se2.compose(r, GRASP), motion=None):
+    """Run until finished; item gives the object's pose, motion the robot's."""
+    for k in range(round(seconds * 100)):
+        tick = tracker.tick(0.01, robot, item(0.01 * k, robot))
+        yield tick, robot
+        if tick.finished:
+            return
+        robot = (motion or unicycle_step)(robot, tick.v, tick.omega, 0.01)
+
+
+def test_push_brings_the_object_to_the_end():
+    tracker = make()
+    tracker.start(task())
+    start = np.array([0.0, 0.004, 0.0])
+    *_, (tick, robot) = drive(tracker, start, 20)
+    assert tick.finished and tick.code is TrackError.NONE
+    item = se2.compose(robot, GRASP)
+    assert item[:2] == pytest.approx([0.495, 0.0], abs=4e-3)
+    assert (tick.v, tick.omega) == (0.0, 0.0)
+
+
+def test_the_object_counts_when_it_sits_off_its_place():
+    """A 3 mm and 1 degree offset of the object in the bumper is steered out by the robot."""
+    seen = GRASP + np.array([0.0, 0.003, 0.017])
+    tracker = make()
+    tracker.start(task(0.8))
+    *_, (tick, robot) = drive(tracker, np.zeros(3), 30, lambda t, r: se2.compose(r, seen))
+    assert tick.code is TrackError.NONE
+    item = se2.compose(robot, seen)
+    assert abs(item[1]) < 2e-3 and abs(item[2]) < 0.01
+    assert abs(robot[1]) > 1e-3  # the robot itself is beside its nominal way
+
+
+def test_stick_limits_move_with_the_object():
+    tracker = make()
+    tracker.start(task(0.8))
+    for tick, _ in drive(tracker, np.array([0, 0.02, 0]), 20,
+                         lambda t, r: se2.compose(r, GRASP + [0, 0.01, 0])):
+        if tick.v > 0.01:
+            assert tick.curvature_margin > -1e-3
+
+
+def test_lost_contact_is_noticed():
+    tracker = make()
+    tracker.start(task())
+    lost = np.array([0.13, 0.0, 0.0])
+    ticks = list(drive(tracker, np.zeros(3), 20,
+                       lambda t, r: se2.compose(r, GRASP if t < 2 else lost)))
+    tick, _ = ticks[-1]
+    assert tick.code is TrackError.CONTACT_LOST and (tick.v, tick.omega) == (0.0, 0.0)
+    assert len(ticks) < 100 * (2 + 1.5)
+
+
+def test_frozen_poses_are_noticed():
+    """FAULTS 8: fresh stamps, but nothing moves while wheels are driven."""
+    tracker = make()
+    tracker.start(task())
+    ticks = list(drive(tracker, np.zeros(3), 20, motion=lambda r, v, w, dt: r))
+    assert ticks[-1][0].code is TrackError.STUCK and (ticks[-1][0].v, ticks[-1][0].omega) == (0, 0)
+    assert len(ticks) < 600
+
+
+def test_pushed_off_course_is_noticed():
+    tracker = make()
+    tracker.start(task())
+    thrown = iter(range(10**6))
+
+    def motion(robot, v, omega, dt):
+        robot = unicycle_step(robot, v, omega, dt)
+        return robot + [0, 0.15, 0] if next(thrown) == 100 else robot
+
+    *_, (tick, _) = drive(tracker, np.zeros(3), 20, motion=motion)
+    assert tick.code is TrackError.OFF_COURSE
+
+
+def test_a_blocked_way_ends_the_task():
+    """A wall across the way: the tracker must not report success, nor wait for ever."""
+    wall = np.column_stack([np.full(9, 0.25), np.linspace(-0.2, 0.2, 9), np.full(9, 0.06)])
+    tracker = make()
+    tracker.start(task(0.6, push=False, circles=wall))
+    *_, (tick, robot) = drive(tracker, np.zeros(3), 60)
+    assert robot[0] < 0.22
+    if tick.finished:
+        assert tick.code is not TrackError.NONE
+
+
+class Broken:
+    row_generation = True
+
+    def solve(self, H, f, G, b, low, high):
+        return QpSolution(np.zeros(len(f)), False, "broken")
+
+
+def test_failed_solves_fade_to_a_stop_and_are_reported():
+    """FAULTS 5 and 6."""
+    tracker = make()
+    tracker.start(task())
+    for tick, robot in drive(tracker, np.zeros(3), 2):
+        pass
+    assert tick.v > 0.03
+    speed = tick.v
+    tracker.mpc._solver = Broken()
+    ticks = list(drive(tracker, robot, 5))
+    speeds = [t.v for t, _ in ticks]
+    assert all(b <= a for a, b in zip([speed, *speeds], speeds, strict=False))
+    assert ticks[-1][0].code is TrackError.SOLVER_FAILED and ticks[-1][0].v == 0.0
+    assert tracker.failures >= 10
+
+
+def test_delay_is_made_good_by_the_commands_since():
+    delay = 5  # ticks
+    errors = {}
+    for assumed in (0.0, 0.05):
+        tracker = make(replace(TrackerSettings(), pose_delay=assumed))
+        tracker.start(task(0.6, push=False))
+        past = [np.zeros(3)] * (delay + 1)
+        worst = 0.0
+        for k in range(500):
+            tick = tracker.tick(0.01, past[-1 - delay], None)
+            past.append(unicycle_step(past[-1], tick.v, tick.omega, 0.01))
+            if k > 200 and not tick.finished:
+                now, _ = tracker._task.trajectory.sample(np.array([tracker._time]))
+                worst = max(worst, abs(past[-1][0] - now[0, 0]))
+            if tick.finished:
+                break
+        errors[assumed] = worst
+    assert errors[0.05] < 0.5 * errors[0.0]

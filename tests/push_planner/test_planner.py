@@ -1,0 +1,150 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from push_model import se2
+from push_model.occupancy import rasterise
+from push_model.specs import BoxSpec, CircleSpec, EnvironmentSpec
+from push_planner import (
+    DistanceField,
+    NoRobotPath,
+    PlanError,
+    PlannerSettings,
+    PlanningFailed,
+    PushPlanner,
+    plan_robot_path,
+    preemptive_pushes,
+)
+from push_planner.guide_path import guide_paths, path_cost, shortest_path
+
+START, GOAL = np.array([-1.15, -0.7, 0.0]), np.array([1.3, 0.75, 0.0])
+
+
+@pytest.fixture(scope="module")
+def planner(scenario, robot, box):
+    return PushPlanner(PlannerSettings(), scenario.grid, robot, box)
+
+
+@pytest.fixture(scope="module")
+def plan(planner):
+    return planner.solve(START, GOAL)
+
+
+def test_distance_field_against_geometry(scenario):
+    field = DistanceField(scenario.grid)
+    assert field.at(1.0, 0.0) == pytest.approx(0.5, abs=0.012)  # the right wall
+    assert field.at(0.0, 0.0) == pytest.approx(0.18, abs=0.012)  # the passage's half width
+    assert field.at(0.0, 0.5) == 0.0
+    assert field.at(9.0, 9.0) == 0.0
+    assert field.segment((-1.0, 0.0), (1.0, 0.0)) == pytest.approx(0.18, abs=0.012)
+
+
+def test_plan_is_continuous_stable_and_free(plan, planner, scenario, box):
+    assert plan.segments[0].object_start == pytest.approx(START)
+    assert plan.segments[-1].object_end == pytest.approx(GOAL)
+    exact = scenario.grid
+    for before, after in zip(plan.segments, plan.segments[1:], strict=False):
+        assert before.object_end == pytest.approx(after.object_start)
+    for segment in plan.segments:
+        _, _, kappa = segment.curve.sample(2000)
+        assert kappa.max() <= segment.side.trusted.maximum + 1e-3
+        assert kappa.min() >= segment.side.trusted.minimum - 1e-3
+        poses = segment.trajectory.pose
+        assert se2.compose(poses[0], segment.side.grasp)[:2] == pytest.approx(START[:2], abs=1e-6)
+        # independent of the planner's own check: no cell under the object's corners or the robot
+        for pose in poses:
+            item = se2.compose(pose, segment.side.grasp)
+            for x, y in [*se2.transform(item, box.geometry.outline), pose[:2]]:
+                column, row = ((np.array([x, y]) - exact.origin) / exact.resolution).astype(int)
+                assert not exact.occupied[row, column]
+
+
+def test_equal_seeds_give_equal_plans(planner, plan):
+    again = planner.solve(START, GOAL)
+    assert again.cost == plan.cost
+    assert np.array_equal(again.segments[0].trajectory.pose, plan.segments[0].trajectory.pose)
+    assert np.array_equal(again.guide.points, plan.guide.points)
+
+
+def test_plans_only_get_better(planner):
+    costs = [p.best.cost for p in planner.plan(START, np.array([0.9, -0.5, 1.0])) if p.best]
+    assert costs and all(b <= a for a, b in zip(costs, costs[1:], strict=False))
+
+
+def test_change_of_side_where_one_push_cannot_do(robot, box):
+    """Straight across without turning: only pushes on two sides get there."""
+    open_space = PushPlanner(PlannerSettings(), rasterise(EnvironmentSpec((3.0, 2.0))), robot, box)
+    start, goal = np.array([-0.6, -0.5, 0.0]), np.array([0.3, 0.5, np.pi / 2])
+    plan = open_space.solve(start, np.array([0.3, 0.5, 0.0]))
+    assert plan.segments[-1].object_end == pytest.approx([0.3, 0.5, 0.0])
+    assert len(plan.segments) >= 1
+    turned = open_space.solve(start, goal)
+    assert turned.segments[-1].object_end == pytest.approx(goal)
+
+
+@pytest.mark.parametrize(
+    ("start", "goal", "code"),
+    [
+        (START, [0.0, 0.6, 0.0], PlanError.GOAL_OCCUPIED),
+        ([0.0, 0.6, 0.0], GOAL, PlanError.START_OCCUPIED),
+        (START, [5.0, 0.0, 0.0], PlanError.OUTSIDE_MAP),
+        (START, [np.nan, 0.0, 0.0], PlanError.INVALID_GOAL),
+    ],
+)
+def test_impossible_requests_are_refused_with_a_reason(planner, start, goal, code):
+    with pytest.raises(PlanningFailed) as error:
+        planner.solve(np.array(start), np.array(goal))
+    assert error.value.code is code and len(str(error.value)) > 20
+
+
+def test_walled_off_goal_has_no_guide_path(robot, box):
+    walled = EnvironmentSpec((3.0, 2.0), boxes=(BoxSpec((0.0, 0.0), (0.1, 2.0)),))
+    blocked = PushPlanner(
+        replace(PlannerSettings(), rrt_iterations=300), rasterise(walled), robot, box
+    )
+    with pytest.raises(PlanningFailed) as error:
+        blocked.solve(START, GOAL)
+    assert error.value.code is PlanError.NO_GUIDE_PATH
+
+
+def test_bottleneck_sweep_beats_the_shortest_path_by_2_1():
+    """Two ways round an obstacle: the short one hugs the wall, (2.1) wants the wide one."""
+    environment = EnvironmentSpec((3.0, 2.0), circles=(CircleSpec((0.0, -0.25), 0.5),))
+    field = DistanceField(rasterise(environment))
+    settings = replace(PlannerSettings(), clearance_weight=0.3, rrt_iterations=2000)
+    start, goal = np.array([-1.0, -0.4]), np.array([1.0, -0.4])
+    short = path_cost(field, shortest_path(field, start, goal, 0.05, 2000, 0.3, 1), settings)
+    best = min(guide_paths(field, start, goal, 0.05, settings, 1), key=lambda g: g.cost)
+    assert best.cost < 0.6 * short.cost
+    assert best.clearance > 1.5 * short.clearance
+    assert best.length >= short.length - 1e-6
+
+
+def test_preemptive_pushes_are_free_sorted_and_stable(planner):
+    offers = preemptive_pushes(planner, START, GOAL, 1)
+    assert offers
+    gaps = [np.hypot(*(s.object_end - GOAL)[:2]) for s in offers]
+    assert gaps == sorted(gaps)
+    assert all(s.clearance >= planner.settings.safety_distance for s in offers)
+
+
+def test_robot_path_goes_round_the_object(planner, robot):
+    circle = np.array([[0.5, 0.0, 0.2]])
+    path = plan_robot_path(
+        planner.scene.field, robot, planner.settings, np.array([0.2, 0.0, 0.0]),
+        np.array([0.8, 0.0, 0.0]), circle,
+    )
+    assert path.pose[-1] == pytest.approx([0.8, 0.0, 0.0], abs=1e-6)
+    assert np.hypot(path.pose[:, 0] - 0.5, path.pose[:, 1]).min() >= 0.2
+    # turns happen on the spot: never both at once
+    assert np.abs(path.twist[:, 0] * path.twist[:, 1]).max() == 0.0
+
+
+def test_no_robot_path_through_a_wall(robot):
+    walled = EnvironmentSpec((3.0, 2.0), boxes=(BoxSpec((0.0, 0.0), (0.1, 2.0)),))
+    with pytest.raises(NoRobotPath):
+        plan_robot_path(
+            DistanceField(rasterise(walled)), robot, PlannerSettings(), np.array([-1.0, 0, 0]),
+            np.array([1.0, 0, 0]), np.zeros((0, 3)),
+        )

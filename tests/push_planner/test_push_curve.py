@@ -1,0 +1,87 @@
+"""The push curve against its definition and against an independent optimiser."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import minimize
+
+from push_planner import PushCurve, shortest_push_curve
+
+angles = st.floats(-1.5, 1.5)
+starts = st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(-3, 3)).map(np.array)
+
+
+def finish(start, distance, bearing, turn):
+    heading = start[2] + bearing
+    return np.array([start[0] + distance * math.cos(heading),
+                     start[1] + distance * math.sin(heading), start[2] + turn])
+
+
+@given(starts, st.floats(0.2, 1.5), angles, angles, st.floats(0.05, 2), st.floats(0.05, 2))
+def test_boundary_conditions_of_the_corrected_formula(start, distance, bearing, turn, ki, kf):
+    """Errata (2.4): with +3 p_i the end tangents are k_i and k_f long, in the poses' directions."""
+    end = finish(start, distance, bearing, turn)
+    points, _, _ = PushCurve(start, end, ki, kf, 0.0).sample(200001)
+    assert points[0] == pytest.approx(start[:2]) and points[-1] == pytest.approx(end[:2])
+    first = (points[1] - points[0]) * 200000
+    last = (points[-1] - points[-2]) * 200000
+    assert first == pytest.approx(ki * np.array([math.cos(start[2]), math.sin(start[2])]), abs=1e-3)
+    assert last == pytest.approx(kf * np.array([math.cos(end[2]), math.sin(end[2])]), abs=1e-3)
+
+
+@settings(deadline=None)
+@given(starts, st.floats(0.2, 1.5), angles, angles, st.floats(-6, -1), st.floats(1, 6))
+def test_found_curves_keep_both_limits_everywhere(start, distance, bearing, turn, low, high):
+    end = finish(start, distance, bearing, turn)
+    curve = shortest_push_curve(start, end, low, high)
+    if curve is None:
+        return
+    points, heading, kappa = curve.sample(2001)
+    assert kappa.max() <= high * (1 + 2e-3) and kappa.min() >= low * (1 + 2e-3)
+    assert curve.length == pytest.approx(np.hypot(*np.diff(points, axis=0).T).sum(), rel=1e-3)
+    measured = np.gradient(heading) / np.maximum(
+        np.hypot(*np.gradient(points, axis=0).T), 1e-12
+    )
+    assert measured[1:-1] == pytest.approx(kappa[1:-1], rel=0.05, abs=0.1)
+
+
+def test_as_short_as_slsqp_finds_and_never_misses_what_it_finds():
+    random = np.random.default_rng(4)
+    missed = gaps = 0
+    for _ in range(40):
+        start = np.zeros(3)
+        end = finish(start, random.uniform(0.3, 1.5), random.uniform(-1, 1), random.uniform(-1.5, 1.5))
+        low, high = -4.0, 5.0
+
+        def bend(k, end=end):
+            return PushCurve(np.zeros(3), end, *np.maximum(k, 1e-3), 0.0).sample(101)
+
+        def length(k, bend=bend):
+            return np.hypot(*np.diff(bend(k)[0], axis=0).T).sum()
+
+        distance = np.hypot(*end[:2])
+        other = minimize(
+            length, [distance, distance], method="SLSQP", bounds=[(0.02, 20)] * 2,
+            constraints=[{"type": "ineq", "fun": lambda k, bend=bend: high - bend(k)[2]},
+                         {"type": "ineq", "fun": lambda k, bend=bend: bend(k)[2] - low}],
+        )
+        ours = shortest_push_curve(start, end, low, high)
+        if other.success and np.all(bend(other.x)[2] <= high - 0.02) and np.all(
+            bend(other.x)[2] >= low + 0.02
+        ):
+            missed += ours is None
+            gaps += ours is not None and ours.length > 1.01 * other.fun
+    assert missed == 0 and gaps == 0
+
+
+def test_straight_push_is_straight():
+    curve = shortest_push_curve(np.zeros(3), np.array([1.0, 0.0, 0.0]), -0.1, 0.1)
+    assert curve.length == pytest.approx(1.0, abs=1e-4)
+
+
+def test_limits_must_enclose_zero():
+    with pytest.raises(ValueError, match="enclose 0"):
+        shortest_push_curve(np.zeros(3), np.ones(3), 0.1, 0.2)
