@@ -58,6 +58,11 @@ class Observer(Node):
         self.create_subscription(ControllerStatus, "/controller/status", self._on_status, STATUS)
         self._goal_publisher = self.create_publisher(PoseStamped, "/goal_pose", COMMAND)
 
+    @property
+    def connected(self) -> bool:
+        """Whether a goal would be received."""
+        return int(self._goal_publisher.get_subscription_count()) > 0
+
     def send_goal(self, goal: Array) -> None:
         """Publish a goal ``(3,)`` on /goal_pose."""
         self._goal_publisher.publish(pose_stamped_to_ros(goal, 0.0))
@@ -190,7 +195,7 @@ class LockstepRun:
                 and self.bridge.count_publishers(f"/{robot}/cmd_vel") > 0
                 and self.bridge.count_subscribers("/poses") >= 2
                 and self.observer.count_publishers("/ground_truth/poses") > 0
-                and self.supervisor.count_subscribers("/goal_pose") > 0
+                and self.observer.connected
                 and self.supervisor._grid is not None
                 and self.planner._grid is not None
                 and self.observer.state is not None

@@ -59,7 +59,7 @@ class Monitor:
         while time.monotonic() < end and alive():
             ready = (
                 self._state is not None and self._map and self._position is not None
-                and self._node.count_subscribers("/goal_pose") > 0
+                and self._publisher.get_subscription_count() > 0
                 and self._node.count_publishers("/supervisor/state") > 0
             )
             if ready:

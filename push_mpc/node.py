@@ -223,6 +223,9 @@ class ControllerNode(Node):
             tracker.v = tracker.omega = 0.0
             self._mode = ControllerStatus.HOLD
             self._reason = f"no valid pose of {self.robot if robot is None else self._object}"
+            self._ticks += 1
+            if self._ticks % 10 == 0:
+                self._server.feedback(FollowTrajectory.Feedback())
             self._publish_command(0.0, 0.0)
             self._publish_status(None)
             return

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from nav_msgs.msg import OccupancyGrid, Path
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from push_model.occupancy import OccupancyGrid as Grid
@@ -37,6 +38,8 @@ from push_ros.qos import LATCHED
 from push_ros.scenario import Scenario, load_scenario
 from push_ros.validation import FRAME, InvalidMessage, planar_pose
 
+_MAP_PATIENCE = 5.0  # [s] wall time that a request waits for the first map
+
 
 class PlannerNode(Node):
     """Plans in slices between which its executor serves others, so that a goal can be cancelled."""
@@ -53,6 +56,7 @@ class PlannerNode(Node):
         self._grid: Grid | None = None
         self._work: Iterator[Progress] | None = None
         self._best: PushPlan | None = None
+        self._pending = False
         self.plans = self.failures = 0
         self.last_time = 0.0
         self._diagnostics = Diagnostics(self, self._state)
@@ -70,6 +74,9 @@ class PlannerNode(Node):
             ),
         )
         self.create_service(PlanRobotPath, "/plan_robot_path", self._on_robot_path)
+        self._watchdog = self.create_timer(
+            0.5, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
         self._on_grid(self._scenario.grid)  # until a map comes, and to warm up
         self._warm_up()
         self._grid = None
@@ -89,6 +96,13 @@ class PlannerNode(Node):
     def _on_grid(self, grid: Grid) -> None:
         self._grid = grid
         self._planners.clear()
+        if self._pending:
+            self._begin(self._request)
+
+    def _on_watchdog(self) -> None:
+        if self._pending and time.monotonic() - self._started > _MAP_PATIENCE:
+            self._pending = False
+            self._fail(PlanPush.Result.NO_MAP, "no map has been received on /map")
 
     def _planner(self, robot: str, item: str) -> PushPlanner:
         assert self._grid is not None
@@ -119,9 +133,9 @@ class PlannerNode(Node):
         self._work = None
         try:
             self._request = request
-            if self._grid is None:
-                self._fail(PlanPush.Result.NO_MAP, "no map has been received on /map")
-                return
+            self._pending = self._grid is None
+            if self._pending:
+                return  # until the map comes, or the watchdog loses patience
             for stamped in (request.start, request.goal):
                 if stamped.header.frame_id != FRAME:
                     self._fail(
@@ -192,6 +206,7 @@ class PlannerNode(Node):
         self._server.finish(PlanPush.Result(error_code=code, error_msg=message), success=False)
 
     def _canceled(self) -> None:
+        self._pending = False
         self._fail(PlanPush.Result.CANCELED, "canceled")
 
     def _on_robot_path(self, request: Any, response: Any) -> Any:

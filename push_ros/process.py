@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import rclpy
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.experimental import EventsExecutor
+from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
@@ -33,13 +35,21 @@ class Spinner:
 
     def __init__(self, nodes: Sequence[Node]) -> None:
         self.nodes = list(nodes)
+        self.garbage = 0
         self.executor = EventsExecutor()
         for node in self.nodes:
             self.executor.add_node(node)
 
     def once(self, timeout: float = 0.1) -> None:
         """Handle what is there, or wait for it up to timeout [s]; without one rclpy may hang."""
-        self.executor.spin_once(timeout)
+        try:
+            self.executor.spin_once(timeout)
+        except (RuntimeError, RCLError) as error:
+            # Bytes that are no message of the topic's type: rclpy raises out of the executor.
+            if not any(word in str(error).lower() for word in ("take", "deserial", "convert")):
+                raise
+            self.garbage += 1
+            get_logger("planar_push").warning(f"a message could not be read: {error}")
 
     def until(self, condition: Callable[[], bool], limit: float) -> bool:
         """Spin until the condition holds; False when it does not within limit [s] wall time."""

@@ -12,6 +12,7 @@ FRAME = "map"
 """The fixed frame of the project."""
 
 _NORM_TOLERANCE = 1e-2
+_FARTHEST = 1e5  # [m] from the origin
 
 
 class InvalidMessage(ValueError):
@@ -37,7 +38,9 @@ def planar_pose(message: Any, what: str = "pose") -> Array:
     """
     p, q = message.position, message.orientation
     finite((p.x, p.y, p.z, q.x, q.y, q.z, q.w), what)
-    norm = math.sqrt(q.x**2 + q.y**2 + q.z**2 + q.w**2)
+    if max(abs(p.x), abs(p.y)) > _FARTHEST:
+        raise InvalidMessage(f"{what}: ({p.x:.3g}, {p.y:.3g}) m is not a plausible position")
+    norm = math.hypot(q.x, q.y, q.z, q.w)
     if abs(norm - 1.0) > _NORM_TOLERANCE:
         raise InvalidMessage(f"{what}: quaternion of norm {norm:.3g}, expected 1")
     yaw = se2.yaw_from_quaternion(q.x / norm, q.y / norm, q.z / norm, q.w / norm)

@@ -57,6 +57,9 @@ class SupervisorSettings:
     displacement_turn: float = bounded(0.12, low=1e-3, high=3.2, doc="[rad] likewise")
     max_replans: int = bounded(4, low=0, high=100, doc="new plans within one job")
     max_retries: int = bounded(2, low=0, high=100, doc="further tries to position in a row")
+    max_losses: int = bounded(
+        40, low=0, high=10000, doc="times in a row that the controller may be gone"
+    )
     max_preemptive: int = bounded(8, low=0, high=100, doc="pre-emptive pushes offered to the planner")
     approach_speed: float = bounded(0.04, low=1e-3, high=2.0, doc="[m/s] to contact and back")
     acceleration: float = bounded(0.1, low=1e-3, high=10.0, doc="[m/s^2] of those motions")
@@ -64,6 +67,9 @@ class SupervisorSettings:
     obstacle_margin: float = bounded(0.008, low=0.0, high=1.0, doc="[m] robot body to obstacles")
     heartbeat_timeout: float = bounded(
         0.25, low=0.05, high=10.0, doc="[s] without the supervisor until a robot stops"
+    )
+    controller_timeout: float = bounded(
+        1.0, low=0.2, high=60.0, doc="[s] without a sign of the controller until it counts as lost"
     )
     node_timeout: float = bounded(
         20.0, low=0.5, high=600.0, doc="[s] wall time to wait for a lost node to return"
@@ -128,8 +134,9 @@ class Machine:
         self._offers: list[Any] = []
         self._offers_asked = False
         self._prefix: list[Any] = []
-        self._last_failure = ""
+        self._last_failure = "no plan was found"
         self._retries = 0
+        self._losses = 0
         self._recovering = ""
         self._execute = False
         self._table: dict[Event, tuple[frozenset[State], Handler]] = {
@@ -192,7 +199,7 @@ class Machine:
             self._finish(JobError.PREEMPTED, "a new goal replaces this one")
         self.goal, self.busy, self.error = goal, True, JobError.NONE
         self._execute = self.settings.auto_execute and not plan_only
-        self.replans = self._retries = 0
+        self.replans = self._retries = self._losses = 0
         self._plan("planning for a new goal")
 
     def _plan(self, reason: str) -> None:
@@ -226,8 +233,9 @@ class Machine:
             self._next_offer()
 
     def _on_offers(self, segments: list[Any]) -> None:
-        self._offers = list(segments)[: self.settings.max_preemptive]
-        self._next_offer()
+        if self._offers_asked and not self._offers:
+            self._offers = list(segments)[: self.settings.max_preemptive]
+            self._next_offer()
 
     def _next_offer(self) -> None:
         if not self._offers:
@@ -271,6 +279,7 @@ class Machine:
         self._say(Command.FOLLOW_RETREAT)
 
     def _on_motion_done(self) -> None:
+        self._losses = 0
         if self.state is State.POSITIONING:
             self._enter(State.APPROACH, f"approaching side {self.segment.side}")
             self._say(Command.FOLLOW_APPROACH, segment=self.segment)
@@ -319,7 +328,7 @@ class Machine:
 
     def _on_motion_failed(self, message: str, lost: bool = False) -> None:
         if lost:
-            self._replan(message, JobError.NODE_LOST)
+            self._lost(message)
         elif self.state is State.PUSHING or self.state is State.APPROACH:
             self._retreat(message)
         elif self.state is State.POSITIONING:
@@ -327,6 +336,17 @@ class Machine:
         else:
             # Not even the way back is free: plan from here as it stands.
             self._replan(f"could not back off: {message}")
+
+    def _lost(self, message: str) -> None:
+        """The controller is gone; whoever takes its place starts with the step that was cut off."""
+        self._losses += 1
+        if self._losses > self.settings.max_losses:
+            self._say(Command.STOP)
+            self._finish(JobError.NODE_LOST, message)
+        elif self.state is State.POSITIONING:
+            self._position(message)
+        else:
+            self._retreat(self._recovering or message)
 
     def _on_displaced(self, message: str) -> None:
         self._say(Command.STOP)

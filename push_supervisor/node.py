@@ -81,6 +81,8 @@ class SupervisorNode(Node):
         self._last_wall = time.monotonic()
         self._lost_since: float | None = None
         self._displaced = 0
+        self._following = False
+        self._last_sign = 0.0
         self._path_token = 0
         self._queue: list[tuple[Event, dict[str, Any]]] = []
         self._handling = False
@@ -270,6 +272,7 @@ class SupervisorNode(Node):
         if command in (Command.STOP, Command.CANCEL_PLAN):
             self._plan_client.forget()
             self._follow_client.forget()
+            self._following = False
             self._path_token += 1
         elif command is Command.FINISH:
             self._end_job(arguments["code"], arguments["message"])
@@ -309,11 +312,14 @@ class SupervisorNode(Node):
         self._publish_state()
 
     def _watch_servers(self) -> None:
-        """A controller that dies in the middle of a motion never answers."""
-        moving = self.machine.state in (
-            State.POSITIONING, State.APPROACH, State.PUSHING, State.DETACHING
-        )
-        if moving and self._ticks % 10 == 0 and not self._follow_client.ready:
+        """A controller that dies in the middle of a motion never answers.
+
+        Its action server stays in the graph for seconds, and one started in its place looks the
+        same: only its feedback tells. Measured in pose time, which stands still with the poses.
+        """
+        silence = self._poses.stamp - self._last_sign
+        if self._following and silence > self.settings.controller_timeout:
+            self._following = False
             self._follow_client.forget()
             self._fire(Event.MOTION_FAILED, message="the controller is gone", lost=True)
 
@@ -342,7 +348,7 @@ class SupervisorNode(Node):
             self._follow_push(arguments["segment"])
         else:
             back = self._straight(robot, -self.settings.detach_distance)
-            self._follow(trajectory_to_ros(back), None)
+            self._follow(trajectory_to_ros(back), self._obstacles)
 
     def _straight(self, start: Array, distance: float) -> Trajectory:
         return line(start, distance, self.settings.approach_speed, self.settings.acceleration)
@@ -438,6 +444,7 @@ class SupervisorNode(Node):
 
     def _send_follow(self, goal: Any) -> None:
         def done(result: Any) -> None:
+            self._following = False
             if result is None:
                 self._fire(Event.MOTION_FAILED, message="the controller rejected the trajectory")
             elif result.error_code == FollowTrajectory.Result.NONE:
@@ -447,7 +454,11 @@ class SupervisorNode(Node):
             else:
                 self._fire(Event.MOTION_FAILED, message=result.error_msg)
 
-        self._follow_client.send(goal, done)
+        def sign(feedback: Any) -> None:
+            self._last_sign = self._poses.stamp
+
+        self._following, self._last_sign = True, self._poses.stamp
+        self._follow_client.send(goal, done, sign)
 
     # Outputs
 
@@ -467,6 +478,7 @@ class SupervisorNode(Node):
     def _end_job(self, code: JobError, message: str) -> None:
         self._plan_client.forget()
         self._follow_client.forget()
+        self._following = False
         if not self._job.active:
             return
         way, turn = self._errors(self.machine.goal)

@@ -1,0 +1,218 @@
+"""The state machine: the thesis's walk, everything beyond it, and an exhaustive random walk."""
+
+from types import SimpleNamespace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from push_supervisor import Command, Event, JobError, Machine, State, SupervisorSettings
+
+
+def segment(side):
+    return SimpleNamespace(side=side, object_end=f"end of {side}")
+
+
+def make(there=False, **changes):
+    answer = {"there": there}
+    machine = Machine(SupervisorSettings(**changes), lambda goal: (answer["there"], "error"))
+    return machine, answer
+
+
+def commands(out):
+    return [command for command, _ in out]
+
+
+def walk(machine, *events):
+    out = []
+    for event, payload in events:
+        out = machine.handle(event, **payload)
+    return out
+
+
+GOAL = (Event.GOAL, {"goal": "g"})
+DONE = (Event.MOTION_DONE, {})
+PATH = (Event.PATH, {"trajectory": "t"})
+
+
+def planned(*sides):
+    return (Event.PLANNED, {"segments": [segment(s) for s in sides]})
+
+
+def test_algorithm_4_with_a_change_of_side():
+    machine, answer = make()
+    seen = []
+    for event, payload in [GOAL, planned(0, 0, 1), PATH, DONE, DONE, DONE, DONE, DONE, PATH, DONE,
+                           DONE, DONE]:
+        out = machine.handle(event, **payload)
+        seen.append((machine.state.name, *commands(out)))
+    assert seen == [
+        ("PLANNING", Command.PLAN),
+        ("POSITIONING", Command.PATH),
+        ("POSITIONING", Command.FOLLOW_PATH),
+        ("APPROACH", Command.FOLLOW_APPROACH),
+        ("PUSHING", Command.FOLLOW_PUSH),
+        ("PUSHING", Command.FOLLOW_PUSH),  # same side: on without letting go
+        ("DETACHING", Command.FOLLOW_RETREAT),
+        ("POSITIONING", Command.PATH),
+        ("POSITIONING", Command.FOLLOW_PATH),
+        ("APPROACH", Command.FOLLOW_APPROACH),
+        ("PUSHING", Command.FOLLOW_PUSH),
+        ("DETACHING", Command.FOLLOW_RETREAT),
+    ]
+    answer["there"] = True
+    out = machine.handle(Event.MOTION_DONE)
+    assert machine.state is State.IDLE and out[-1][1]["code"] is JobError.NONE
+
+
+def test_waits_for_the_execute_command():
+    machine, _ = make(auto_execute=False)
+    walk(machine, GOAL, planned(0))
+    assert machine.state is State.IDLE and machine.plan_ready
+    out = machine.handle(Event.EXECUTE)
+    assert machine.state is State.POSITIONING and commands(out) == [Command.PATH]
+
+
+def test_plan_only_waits_even_when_execution_is_automatic():
+    machine, _ = make()
+    machine.handle(Event.GOAL, goal="g", plan_only=True)
+    walk(machine, planned(0))
+    assert machine.plan_ready
+
+
+def test_already_there_needs_no_plan():
+    machine, _ = make(there=True)
+    out = walk(machine, GOAL)
+    assert out[-1][0] is Command.FINISH and out[-1][1]["code"] is JobError.NONE
+
+
+def failed(retry=True):
+    return (Event.PLAN_FAILED, {"code": JobError.PLANNING_FAILED, "message": "m", "retry": retry})
+
+
+def test_preemptive_push_comes_first_in_the_plan():
+    """Section 2.5: after a failure the planner is asked from the ends of offered pushes, in order."""
+    machine, _ = make()
+    out = walk(machine, GOAL, failed())
+    assert commands(out) == [Command.OFFER]
+    a, b = segment(2), segment(3)
+    out = machine.handle(Event.OFFERS, segments=[a, b])
+    assert out[0] == (Command.PLAN, {"start": a, "goal": "g"})
+    out = walk(machine, failed())
+    assert out[0] == (Command.PLAN, {"start": b, "goal": "g"})
+    walk(machine, planned(1))
+    assert [s.side for s in machine.segments] == [3, 1]
+
+
+def test_gives_up_when_no_offer_helps():
+    machine, _ = make()
+    walk(machine, GOAL, failed())
+    machine.handle(Event.OFFERS, segments=[segment(0)])
+    out = walk(machine, failed())
+    assert out[-1][1]["code"] is JobError.PLANNING_FAILED and machine.state is State.IDLE
+
+
+def test_hopeless_goal_is_not_retried():
+    machine, _ = make()
+    out = walk(machine, GOAL, failed(retry=False))
+    assert commands(out) == [Command.FINISH]
+
+
+def test_failed_push_backs_off_and_plans_anew_from_where_the_object_is():
+    machine, _ = make()
+    walk(machine, GOAL, planned(0), PATH, DONE, DONE)
+    out = machine.handle(Event.MOTION_FAILED, message="contact lost")
+    assert machine.state is State.DETACHING and commands(out) == [Command.FOLLOW_RETREAT]
+    out = walk(machine, DONE)
+    assert machine.state is State.PLANNING and out[0] == (Command.PLAN, {"start": None, "goal": "g"})
+    assert "contact lost" in machine.reason
+
+
+def test_replans_are_bounded():
+    machine, _ = make(max_replans=2)
+    out = walk(machine, GOAL)
+    for _ in range(3):
+        walk(machine, planned(0), PATH, DONE, DONE)
+        out = machine.handle(Event.MOTION_FAILED, message="slipped")
+        out = walk(machine, DONE)
+    assert out[-1][1]["code"] is JobError.EXECUTION_FAILED and "slipped" in machine.reason
+
+
+def test_off_target_after_the_last_push_plans_anew():
+    machine, _ = make(max_replans=0)
+    out = walk(machine, GOAL, planned(0), PATH, DONE, DONE, DONE, DONE)
+    assert out[-1][1]["code"] is JobError.OFF_TARGET
+
+
+def test_moved_object_stops_the_robot_and_plans_anew():
+    machine, _ = make()
+    walk(machine, GOAL, planned(0), PATH)
+    out = machine.handle(Event.DISPLACED, message="moved")
+    assert commands(out) == [Command.STOP, Command.PLAN] and machine.state is State.PLANNING
+
+
+def test_lost_controller_is_waited_for_and_given_up_on_in_the_end():
+    machine, _ = make(max_losses=3)
+    lost = (Event.MOTION_FAILED, {"message": "gone", "lost": True})
+    walk(machine, GOAL, planned(0), PATH, DONE, DONE)
+    for _ in range(3):  # back off first, whoever does it: the robot stands at the object
+        assert commands(walk(machine, lost)) == [Command.FOLLOW_RETREAT]
+    assert commands(walk(machine, DONE)) == [Command.PLAN] and "gone" in machine.reason
+    walk(machine, planned(0), PATH)
+    assert commands(walk(machine, lost)) == [Command.PATH]
+    walk(machine, PATH, DONE, *[lost] * 3)
+    assert walk(machine, lost)[-1][1]["code"] is JobError.NODE_LOST
+
+
+@pytest.mark.parametrize("steps", range(1, 8))
+@pytest.mark.parametrize(
+    ("event", "code"),
+    [(Event.CANCEL, JobError.CANCELED), (Event.CLOCK_RESET, JobError.CLOCK_RESET)],
+)
+def test_cancel_and_reset_stop_in_every_state(steps, event, code):
+    machine, _ = make()
+    walk(machine, *[GOAL, planned(0), PATH, DONE, DONE, DONE][: steps])
+    halt = {State.IDLE: [], State.PLANNING: [Command.CANCEL_PLAN]}.get(machine.state, [Command.STOP])
+    out = machine.handle(event)
+    assert commands(out) == [*halt, Command.FINISH]
+    assert out[-1][1]["code"] is code and machine.state is State.IDLE and not machine.busy
+
+
+def test_new_goal_replaces_the_old_one():
+    machine, _ = make()
+    walk(machine, GOAL, planned(0), PATH)
+    out = machine.handle(Event.GOAL, goal="h")
+    assert commands(out) == [Command.STOP, Command.FINISH, Command.PLAN]
+    assert out[1][1]["code"] is JobError.PREEMPTED and machine.goal == "h"
+
+
+ANY = st.sampled_from([
+    GOAL, (Event.EXECUTE, {}), (Event.CANCEL, {}), planned(0), planned(0, 1), planned(1, 1),
+    failed(), failed(False), (Event.OFFERS, {"segments": []}),
+    (Event.OFFERS, {"segments": [segment(2), segment(3)]}), PATH,
+    (Event.PATH_FAILED, {"message": "m"}), DONE, (Event.MOTION_FAILED, {"message": "m"}),
+    (Event.MOTION_FAILED, {"message": "m", "lost": True}), (Event.DISPLACED, {"message": "m"}),
+    (Event.CLOCK_RESET, {}),
+])
+MOTIONS = {Command.FOLLOW_PATH, Command.FOLLOW_APPROACH, Command.FOLLOW_PUSH,
+           Command.FOLLOW_RETREAT}
+
+
+@given(st.lists(ANY, max_size=60), st.booleans(), st.booleans())
+def test_invariants_of_any_walk(events, automatic, there):
+    machine, _ = make(there, auto_execute=automatic)
+    for event, payload in events:
+        before = machine.state
+        out = commands(machine.handle(event, **payload))
+        assert sum(c in MOTIONS for c in out) <= 1
+        if MOTIONS & set(out):
+            assert machine.state not in (State.IDLE, State.PLANNING)
+        if machine.state is State.PUSHING:
+            assert machine.index < len(machine.segments)
+        if machine.state is State.IDLE and before not in (State.IDLE, State.PLANNING):
+            # nothing moves a robot after a job has ended
+            assert Command.STOP in out or before is State.DETACHING
+            assert Command.FINISH in out
+        if Command.FINISH in out and machine.state is State.IDLE:
+            assert not machine.busy and machine.segments == []
+        assert machine.reason

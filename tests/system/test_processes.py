@@ -1,0 +1,131 @@
+"""One process per node: dead nodes, restarts, signals at any moment, the demo."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from push_bringup.bag import read_bag
+from push_bringup.launcher import Launcher, single_robot
+from push_bringup.monitor import Monitor
+
+FACTOR = ["--ros", "-p", "real_time_factor:=3.0"]
+
+
+@pytest.fixture
+def domain(monkeypatch):
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(1 + (os.getpid() * 13 + time.time_ns() // 1000) % 100))
+
+
+def alive(group):
+    return [c for c in group if c.process is not None and c.process.poll() is None]
+
+
+def wait(monitor, condition, limit):
+    end = time.monotonic() + limit
+    while time.monotonic() < end and not condition():
+        monitor._spinner.once(0.05)
+    return condition()
+
+
+@pytest.mark.parametrize("respawn", [True, False])
+def test_killed_controller(domain, respawn, tmp_path):
+    """FAULTS 11: wheels stop, the launcher names the dead; with respawn the goal is reached."""
+    said = []
+    launcher = Launcher(
+        single_robot("short", str(tmp_path / "bag"), {"bridge": FACTOR}), respawn, said.append
+    )
+    launcher.start()
+    try:
+        with Monitor() as monitor:
+            assert monitor.connect(40.0, lambda: not launcher.check())
+            monitor.send_goal((0.1, 0.04, 0.1))
+            assert wait(monitor, lambda: monitor._position[0] > -0.35, 40.0)
+            (controller,) = [c for c in launcher.children if c.name == "controller"]
+            controller.process.send_signal(signal.SIGKILL)
+            end = time.monotonic() + 2.0
+            while not said and time.monotonic() < end:
+                launcher.check()
+                time.sleep(0.02)
+            assert any("controller died (signal 9)" in text for text in said)
+            if not respawn:
+                wait(monitor, lambda: False, 0.5)
+                before = monitor._position
+                wait(monitor, lambda: False, 0.7)
+                assert np.hypot(*np.subtract(monitor._position, before)) < 2e-4
+            else:
+                code = monitor.follow(90.0, lambda: launcher.check() is not None)
+                assert code == 0, monitor._state.reason
+                assert np.hypot(monitor._position[0] - 0.1, monitor._position[1] - 0.04) < 0.02
+    finally:
+        children = list(launcher.children)
+        started = time.monotonic()
+        launcher.stop()
+    assert time.monotonic() - started < 5.0 and not alive(children)
+    topics = {r.topic for r in read_bag(tmp_path / "bag")}
+    assert {"/poses", "/epuck1/cmd_vel", "/supervisor/state"} <= topics
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("seed", range(2))
+def test_signals_at_random_moments(domain, number, seed, tmp_path):
+    """FAULTS 18: everything ends within five seconds, none left, the bag is readable."""
+    moment = np.random.default_rng([seed, int(number)]).uniform(0.05, 5.0)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "push_bringup.cli", "launch", "single", "--scenario", "short",
+         "--record", str(tmp_path / "bag")],
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
+    )
+    time.sleep(moment)
+    children = children_of(process.pid)
+    process.send_signal(number)
+    process.wait(5.0)
+    time.sleep(0.1)
+    assert not [pid for pid in children if os.path.exists(f"/proc/{pid}") and not zombie(pid)]
+    if (tmp_path / "bag").exists() and list((tmp_path / "bag").glob("*.mcap")):
+        list(read_bag(tmp_path / "bag"))
+
+
+def children_of(pid):
+    found = []
+    for entry in os.listdir("/proc"):
+        if entry.isdigit():
+            try:
+                with open(f"/proc/{entry}/stat") as file:
+                    if int(file.read().rsplit(")", 1)[1].split()[1]) == pid:
+                        found.append(int(entry))
+            except OSError:
+                continue
+    return found
+
+
+def zombie(pid):
+    try:
+        with open(f"/proc/{pid}/stat") as file:
+            return file.read().rsplit(")", 1)[1].split()[0] == "Z"
+    except OSError:
+        return True
+
+
+def test_demo_ends_with_bag_pictures_and_report(domain, tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "push_bringup.cli", "demo", "--scenario", "short", "--factor", "3",
+         "--out", str(tmp_path / "demo")],
+        capture_output=True, text=True, timeout=180, check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "final error" in done.stdout and "pushing" in done.stdout
+    for name in ("trajectory.png", "animation.gif", "report.pdf", "bag/metadata.yaml"):
+        assert (tmp_path / "demo" / name).stat().st_size > 1000, name
+
+
+def test_wrong_words_are_answered_with_what_to_do():
+    done = subprocess.run(
+        [sys.executable, "-m", "push_bringup.cli", "launch", "single", "--scenario", "atlantis"],
+        capture_output=True, text=True, timeout=60, check=False,
+    )
+    assert done.returncode != 0 and "atlantis" in done.stderr and "env1-target1" in done.stderr
