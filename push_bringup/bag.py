@@ -52,9 +52,7 @@ class BagWriter:
         definition, _ = self._store.generate_msgdef(message_type, ros_version=2)
         schema = self._writer.register_schema(message_type, "ros2msg", definition.encode())
         qos = yaml.safe_dump([_qos(latched)])
-        channel = self._writer.register_channel(
-            topic, "cdr", schema, {"offered_qos_profiles": qos}
-        )
+        channel = self._writer.register_channel(topic, "cdr", schema, {"offered_qos_profiles": qos})
         self._topics[topic] = _Topic(message_type, channel, latched)
 
     def write(self, topic: str, stamp: int, data: bytes) -> None:
@@ -85,7 +83,9 @@ class BagWriter:
         topics = [
             {
                 "topic_metadata": {
-                    "name": name, "type": t.type, "serialization_format": "cdr",
+                    "name": name,
+                    "type": t.type,
+                    "serialization_format": "cdr",
                     "offered_qos_profiles": [_qos(t.latched)],
                     "type_description_hash": self._store.hash_rihs01(t.type),
                 },
@@ -98,13 +98,20 @@ class BagWriter:
         start = {"nanoseconds_since_epoch": self._first}
         name = f"{self.folder.name}_0.mcap"
         information = {
-            "version": 9, "storage_identifier": "mcap", "duration": duration,
-            "starting_time": start, "message_count": total,
-            "topics_with_message_count": topics, "compression_format": "",
-            "compression_mode": "", "relative_file_paths": [name],
-            "files": [{"path": name, "starting_time": start, "duration": duration,
-                       "message_count": total}],
-            "custom_data": self._metadata, "ros_distro": "jazzy",
+            "version": 9,
+            "storage_identifier": "mcap",
+            "duration": duration,
+            "starting_time": start,
+            "message_count": total,
+            "topics_with_message_count": topics,
+            "compression_format": "",
+            "compression_mode": "",
+            "relative_file_paths": [name],
+            "files": [
+                {"path": name, "starting_time": start, "duration": duration, "message_count": total}
+            ],
+            "custom_data": self._metadata,
+            "ros_distro": "jazzy",
         }
         text = yaml.safe_dump({"rosbag2_bagfile_information": information}, sort_keys=False)
         temporary = self.folder / ".metadata.yaml"
@@ -114,9 +121,14 @@ class BagWriter:
 
 def _qos(latched: bool) -> dict[str, Any]:
     return {
-        "history": "keep_last", "depth": 1 if latched else 10, "reliability": "reliable",
-        "durability": "transient_local" if latched else "volatile", "deadline": _MAXIMUM,
-        "lifespan": _MAXIMUM, "liveliness": "automatic", "liveliness_lease_duration": _MAXIMUM,
+        "history": "keep_last",
+        "depth": 1 if latched else 10,
+        "reliability": "reliable",
+        "durability": "transient_local" if latched else "volatile",
+        "deadline": _MAXIMUM,
+        "lifespan": _MAXIMUM,
+        "liveliness": "automatic",
+        "liveliness_lease_duration": _MAXIMUM,
         "avoid_ros_namespace_conventions": False,
     }
 
@@ -174,7 +186,7 @@ def read_bag(bag: Path, topics: set[str] | None = None) -> Iterator[Record]:
 
 
 def recover(bag: Path, folder: Path) -> int:
-    """Copy what can be read of a cut-off bag into a new, finished one; returns the message count."""
+    """Copy what can be read of a cut-off bag into a finished one; returns the message count."""
     writer = BagWriter(folder, read_metadata(bag))
     schemas: dict[int, str] = {}
     names: dict[int, str] = {}

@@ -96,8 +96,10 @@ def _goal(arguments: argparse.Namespace) -> int:
 
     with Monitor() as monitor:
         if not monitor.connect(10.0):
-            print("error: no supervisor is running; start one with: planar-push launch single",
-                  file=sys.stderr)
+            print(
+                "error: no supervisor is running; start one with: planar-push launch single",
+                file=sys.stderr,
+            )
             return 1
         monitor.send_goal((arguments.x, arguments.y, arguments.theta))
         return 0 if arguments.no_wait else monitor.follow(arguments.timeout, lambda: True)
@@ -170,8 +172,10 @@ def _report(arguments: argparse.Namespace) -> int:
     except (ValueError, FileNotFoundError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
-    print(f"{out}: final error {1e3 * errors['position_error_m']:.1f} mm, "
-          f"{errors['orientation_error_rad']:.3f} rad")
+    print(
+        f"{out}: final error {1e3 * errors['position_error_m']:.1f} mm, "
+        f"{errors['orientation_error_rad']:.3f} rad"
+    )
     return 0
 
 
@@ -188,8 +192,12 @@ def _experiment(arguments: argparse.Namespace) -> int:
 
     out = Path(arguments.out or f"results/{arguments.name}-{time.strftime('%Y%m%d-%H%M%S')}")
     summary = single_robot(
-        arguments.scenarios.split(","), arguments.trials, arguments.seed, out,
-        arguments.scheduler, arguments.workers,
+        arguments.scenarios.split(","),
+        arguments.trials,
+        arguments.seed,
+        out,
+        arguments.scheduler,
+        arguments.workers,
     )
     print(f"\n{out}/summary.json")
     return 0 if summary["trials"] else 1
@@ -208,7 +216,9 @@ def parser() -> argparse.ArgumentParser:
     )
     commands = top.add_subparsers(required=True, metavar="COMMAND")
 
-    def add(name: str, run: Callable[[argparse.Namespace], int], text: str) -> argparse.ArgumentParser:
+    def add(
+        name: str, run: Callable[[argparse.Namespace], int], text: str
+    ) -> argparse.ArgumentParser:
         command = commands.add_parser(name, help=text, description=text)
         command.set_defaults(run=run)
         return command
@@ -249,13 +259,15 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--scheduler", default="", help="address of a Dask scheduler")
     p.add_argument("--workers", type=int, default=0, help="local processes; 0: one a core")
     p = add("bench", _bench, "measure speed and physics, rivals beside")
-    p.add_argument("what", nargs="?", default="all",
-                   choices=["all", "physics", "curve", "mpc", "latency", "lockstep", "plan",
-                            "stable-push"])
+    p.add_argument(
+        "what",
+        nargs="?",
+        default="all",
+        choices=["all", "physics", "curve", "mpc", "latency", "lockstep", "plan", "stable-push"],
+    )
     p.add_argument("--out", default="", help="folder for the JSON")
     p = add("node", _node, "run one node in this process")
-    p.add_argument("name",
-                   choices=["bridge", "planner", "controller", "supervisor", "recorder"])
+    p.add_argument("name", choices=["bridge", "planner", "controller", "supervisor", "recorder"])
     p.add_argument("--scenario", **scenario)  # type: ignore[arg-type]
     p.add_argument("--out", default="bag", help="bag folder of the recorder")
     p.add_argument("--ros", nargs=argparse.REMAINDER, default=[], help="ROS arguments, last")

@@ -1,4 +1,4 @@
-"""Experiments: many seeded trials of a system, a summary, plots, a bag, the thesis's figure beside."""
+"""Experiments: seeded trials of a system, summary, plots, a bag, the thesis's figure beside."""
 
 import csv
 import json
@@ -52,9 +52,12 @@ def draw_world(task: SingleRobotTask) -> tuple[Scenario, Scenario, Row]:
     """What the controller believes, what the world is, and the drawn values."""
     believed = load_scenario(task.scenario)
     believed = believed.settings(
-        "bridge", seed=task.seed, motion_capture__position_noise=task.position_noise,
+        "bridge",
+        seed=task.seed,
+        motion_capture__position_noise=task.position_noise,
         motion_capture__orientation_noise=task.orientation_noise,
-        motion_capture__rate=task.rate, motion_capture__latency=task.latency,
+        motion_capture__rate=task.rate,
+        motion_capture__latency=task.latency,
     ).settings("controller", tracker__pose_delay=task.latency)
     random = np.random.default_rng(task.seed)
     objects = {}
@@ -62,7 +65,8 @@ def draw_world(task: SingleRobotTask) -> tuple[Scenario, Scenario, Row]:
     for name, (spec, start) in believed.objects.items():
         floor, contact = random.uniform(1.0 - task.spread, 1.0 + task.spread, 2)
         changed = replace(
-            spec, floor_friction=spec.floor_friction * float(floor),
+            spec,
+            floor_friction=spec.floor_friction * float(floor),
             contact_friction=spec.contact_friction * float(contact),
         )
         objects[name] = (changed, start)
@@ -82,8 +86,10 @@ def min_clearance(scenario: Scenario, trace: Trace) -> float:
     _, item = scenario.object()
     scene = PushScene(DistanceField(scenario.grid), robot, item, PlannerSettings())
     least = min(
-        (min(scene.robot_clearance(r), scene.object_clearance(o))
-         for r, o in zip(trace.robot[::10], trace.object[::10], strict=False)),
+        (
+            min(scene.robot_clearance(r), scene.object_clearance(o))
+            for r, o in zip(trace.robot[::10], trace.object[::10], strict=False)
+        ),
         default=float("nan"),
     )
     return float(least)
@@ -110,36 +116,54 @@ def single_robot_trial(task: SingleRobotTask) -> Row:
     position, orientation = final_errors(trace, believed.goal)
     reached = state is not None and state.error_code == 0
     success = (
-        reached and position <= SUCCESS_POSITION and orientation <= SUCCESS_ORIENTATION
+        reached
+        and position <= SUCCESS_POSITION
+        and orientation <= SUCCESS_ORIENTATION
         and trace.collisions == 0
     )
     np.savez_compressed(
-        folder / f"trace-{task.scenario}-{task.seed}.npz", time=np.array(trace.time[::10]),
-        robot=np.array(trace.robot[::10]), object=np.array(trace.object[::10]),
+        folder / f"trace-{task.scenario}-{task.seed}.npz",
+        time=np.array(trace.time[::10]),
+        robot=np.array(trace.robot[::10]),
+        object=np.array(trace.object[::10]),
     )
     return {
-        "scenario": task.scenario, "seed": task.seed, "success": success,
+        "scenario": task.scenario,
+        "seed": task.seed,
+        "success": success,
         "reason": "no end within the time limit" if state is None else state.reason,
-        "position_error_m": position, "orientation_error_rad": orientation,
-        "duration_s": duration, "pushes": trace.pushes, "contact_losses": trace.contact_losses,
-        "plan_time_s": trace.plan_time, "min_clearance_m": min_clearance(believed, trace),
+        "position_error_m": position,
+        "orientation_error_rad": orientation,
+        "duration_s": duration,
+        "pushes": trace.pushes,
+        "contact_losses": trace.contact_losses,
+        "plan_time_s": trace.plan_time,
+        "min_clearance_m": min_clearance(believed, trace),
         "collisions": trace.collisions,
-        "replans": 0 if state is None else int(state.replans), **drawn,
+        "replans": 0 if state is None else int(state.replans),
+        **drawn,
     }
 
 
 def aggregate(rows: list[Row]) -> dict[str, Any]:
-    """Success as a fraction; mean, standard deviation and maximum of every measure, over all rows."""
+    """Success as a fraction; mean, standard deviation and maximum of every measure."""
     result: dict[str, Any] = {
         "trials": len(rows),
         "success": sum(bool(r["success"]) for r in rows) / len(rows) if rows else 0.0,
     }
-    names = [k for r in rows for k, v in r.items()
-             if isinstance(v, (int, float)) and not isinstance(v, bool) and k != "seed"]
+    names = [
+        k
+        for r in rows
+        for k, v in r.items()
+        if isinstance(v, (int, float)) and not isinstance(v, bool) and k != "seed"
+    ]
     for name in dict.fromkeys(names):
         values = np.array([r[name] for r in rows if name in r], dtype=np.float64)
-        result[name] = {"mean": float(values.mean()), "std": float(values.std()),
-                        "max": float(values.max())}
+        result[name] = {
+            "mean": float(values.mean()),
+            "std": float(values.std()),
+            "max": float(values.max()),
+        }
     return result
 
 
@@ -150,13 +174,17 @@ def single_robot(
     out.mkdir(parents=True, exist_ok=True)
     tasks = [
         SingleRobotTask(name, seed + i, str(out), record=(i == 0 and j == 0))
-        for j, name in enumerate(scenarios) for i in range(trials)
+        for j, name in enumerate(scenarios)
+        for i in range(trials)
     ]
     if (out / "bag").exists():
         raise FileExistsError(f"{out}/bag is there already; choose another --out or remove it")
     rows = run_trials(single_robot_trial, tasks, out / "trials.jsonl", scheduler, workers)
     summary = {
-        "experiment": "single-robot", "seed": seed, "revision": revision(), "trials": rows,
+        "experiment": "single-robot",
+        "seed": seed,
+        "revision": revision(),
+        "trials": rows,
         "aggregate": aggregate(rows),
     }
     (out / "summary.json").write_text(json.dumps(summary, indent=1) + "\n")
@@ -203,12 +231,14 @@ def _plot(name: str, rows: list[Row], out: Path) -> None:
         if path.is_file():
             way: Array = np.load(path)["object"]
             good = row["success"]
-            axes.plot(way[:, 0], way[:, 1], lw=0.8, alpha=0.7,
-                      color="#2a62c9" if good else "#c22f3d")
+            axes.plot(
+                way[:, 0], way[:, 1], lw=0.8, alpha=0.7, color="#2a62c9" if good else "#c22f3d"
+            )
             axes.fill(*se2.transform(way[-1], outlines[item][0]).T, fill=False, lw=0.7)
     if scenario.goal is not None:
-        axes.fill(*se2.transform(scenario.goal, outlines[item][0]).T, fill=False, lw=1.6,
-                  color="#c22f3d")
+        axes.fill(
+            *se2.transform(scenario.goal, outlines[item][0]).T, fill=False, lw=1.6, color="#c22f3d"
+        )
     axes.set_title(f"{name}: {sum(bool(r['success']) for r in rows)} of {len(rows)} trials succeed")
     figure.savefig(out / f"{name}.png", dpi=130, bbox_inches="tight")
     plt.close(figure)

@@ -37,7 +37,9 @@ class Launcher:
     """
 
     def __init__(
-        self, children: list[Child], respawn: bool = False,
+        self,
+        children: list[Child],
+        respawn: bool = False,
         say: Callable[[str], None] = lambda text: print(text, file=sys.stderr, flush=True),
     ) -> None:
         self.children = children
@@ -94,8 +96,11 @@ class Launcher:
     def stop(self) -> None:
         """End all children: SIGINT, then SIGTERM, then SIGKILL; within five seconds."""
         self._stopping = True
-        for number, limit in ((signal.SIGINT, _GRACE), (signal.SIGTERM, _LAST),
-                              (signal.SIGKILL, 1.0)):
+        for number, limit in (
+            (signal.SIGINT, _GRACE),
+            (signal.SIGTERM, _LAST),
+            (signal.SIGKILL, 1.0),
+        ):
             alive = [c for c in self.children if c.process and c.process.poll() is None]
             for child in alive:
                 assert child.process is not None
@@ -107,7 +112,9 @@ class Launcher:
                 time.sleep(0.02)
 
 
-def single_robot(scenario: str, record: str = "", extra: dict[str, list[str]] | None = None) -> list[Child]:
+def single_robot(
+    scenario: str, record: str = "", extra: dict[str, list[str]] | None = None
+) -> list[Child]:
     """The children of a single-robot run; extra: further command-line words by node name."""
     extra = extra or {}
     children = [

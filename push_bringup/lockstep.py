@@ -14,8 +14,8 @@ from rclpy.signals import SignalHandlerOptions
 
 from push_model import se2
 from push_model.arrays import Array
-from push_msgs.msg import Contacts, ControllerStatus, NamedPoses, PushPlan, SupervisorState
 from push_mpc.node import ControllerNode
+from push_msgs.msg import Contacts, ControllerStatus, NamedPoses, PushPlan, SupervisorState
 from push_planner.node import PlannerNode
 from push_ros.conversions import pose_stamped_to_ros, time_from_ros
 from push_ros.process import Spinner, prepare_environment
@@ -100,14 +100,19 @@ class Observer(Node):
 
     def _on_state(self, message: SupervisorState) -> None:
         if message.state == SupervisorState.PUSHING and (
-            self.state is None or self.state.state != SupervisorState.PUSHING
+            self.state is None
+            or self.state.state != SupervisorState.PUSHING
             or self.state.push_index != message.push_index
         ):
             self.trace.pushes += 1
         self.state = message
         self.trace.states.append(
-            (time_from_ros(message.header.stamp), message.state_name, message.reason,
-             message.error_code)
+            (
+                time_from_ros(message.header.stamp),
+                message.state_name,
+                message.reason,
+                message.error_code,
+            )
         )
 
     def _on_plan(self, message: PushPlan) -> None:
@@ -122,8 +127,11 @@ class LockstepRun:
     """The graph of a scenario in this process. Use it as a context manager."""
 
     def __init__(
-        self, scenario: Scenario, extra: Callable[[], list[Node]] | None = None,
-        world: Scenario | None = None, quiet: bool = False,
+        self,
+        scenario: Scenario,
+        extra: Callable[[], list[Node]] | None = None,
+        world: Scenario | None = None,
+        quiet: bool = False,
     ) -> None:
         """Make the nodes.
 
@@ -243,4 +251,3 @@ def final_errors(trace: Trace, goal: Array) -> tuple[float, float]:
     """Position [m] and orientation [rad] error of the object at the end of a run."""
     local = se2.between(goal, trace.object[-1])
     return float(np.hypot(local[0], local[1])), abs(float(local[2]))
-

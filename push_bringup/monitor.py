@@ -29,7 +29,9 @@ class Monitor:
         self._news = 0
         self._goal: tuple[float, float, float] | None = None
         self._publisher = self._node.create_publisher(PoseStamped, "/goal_pose", COMMAND)
-        self._node.create_subscription(SupervisorState, "/supervisor/state", self._on_state, LATCHED)
+        self._node.create_subscription(
+            SupervisorState, "/supervisor/state", self._on_state, LATCHED
+        )
         self._node.create_subscription(OccupancyGrid, "/map", self._on_map, LATCHED)
         self._node.create_subscription(NamedPoses, "/poses", self._on_poses, STREAM)
         self._spinner = Spinner([self._node])
@@ -58,7 +60,9 @@ class Monitor:
         end = time.monotonic() + limit
         while time.monotonic() < end and alive():
             ready = (
-                self._state is not None and self._map and self._position is not None
+                self._state is not None
+                and self._map
+                and self._position is not None
                 and self._publisher.get_subscription_count() > 0
                 and self._node.count_publishers("/supervisor/state") > 0
             )
@@ -87,6 +91,8 @@ class Monitor:
                 shown = time.monotonic()
                 gap = np.hypot(self._position[0] - self._goal[0], self._position[1] - self._goal[1])
                 print(f"  {gap:6.3f} m to go", flush=True)
-        print("error: the job did not end in time" if alive() else "error: a node died",
-              file=sys.stderr)
+        print(
+            "error: the job did not end in time" if alive() else "error: a node died",
+            file=sys.stderr,
+        )
         return 1

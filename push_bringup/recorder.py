@@ -12,7 +12,6 @@ from nav_msgs.msg import Path as PathMessage
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
-from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
 from push_bringup.bag import BagWriter
@@ -20,6 +19,7 @@ from push_msgs.msg import Contacts, ControllerStatus, NamedPoses, PushPlan, Supe
 from push_ros.conversions import time_from_ros
 from push_ros.qos import CLOCK, COMMAND, LATCHED, STATUS, STREAM
 from push_ros.scenario import Scenario
+from tf2_msgs.msg import TFMessage
 
 
 def revision() -> str:
@@ -28,7 +28,10 @@ def revision() -> str:
     try:
         text = subprocess.run(
             ["git", "-C", str(here), "describe", "--always", "--dirty", "--abbrev=12"],
-            capture_output=True, text=True, timeout=5, check=True,
+            capture_output=True,
+            text=True,
+            timeout=5,
+            check=True,
         ).stdout
     except (OSError, subprocess.SubprocessError):
         return ""
@@ -69,8 +72,12 @@ class RecorderNode(Node):
         super().__init__("recorder")
         self.writer = BagWriter(
             folder,
-            {"scenario": scenario.text, "scenario_name": scenario.name, "seed": str(seed),
-             "revision": revision()},
+            {
+                "scenario": scenario.text,
+                "scenario_name": scenario.name,
+                "seed": str(seed),
+                "revision": revision(),
+            },
         )
         self._sim_time = 0
         for topic, (message, qos) in topics(scenario).items():

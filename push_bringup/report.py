@@ -38,8 +38,16 @@ class BagContents:
     collisions: int = 0
 
 
-STATUS = ("time", "error_x", "error_y", "error_theta", "solve_time", "curvature_margin",
-          "obstacle_margin", "object_offset_y")
+STATUS = (
+    "time",
+    "error_x",
+    "error_y",
+    "error_theta",
+    "solve_time",
+    "curvature_margin",
+    "obstacle_margin",
+    "object_offset_y",
+)
 
 
 def _seconds(stamp: Any) -> float:
@@ -63,8 +71,13 @@ def load(bag: Path) -> BagContents:
     times: list[float] = []
     poses: dict[str, list[Array]] = {}
     status: list[list[float]] = []
-    wanted = {"/ground_truth/poses", "/controller/status", "/supervisor/state", "/push_plan",
-              "/contacts"}
+    wanted = {
+        "/ground_truth/poses",
+        "/controller/status",
+        "/supervisor/state",
+        "/push_plan",
+        "/contacts",
+    }
     for record in read_bag(bag, wanted):
         m = record.message
         if record.topic == "/ground_truth/poses":
@@ -82,7 +95,8 @@ def load(bag: Path) -> BagContents:
             contents.plan = [np.column_stack([s.trajectory.x, s.trajectory.y]) for s in m.segments]
         else:
             contents.collisions += sum(
-                1 for c in m.contacts
+                1
+                for c in m.contacts
                 if ({c.body_a, c.body_b} & bodies) and not {c.body_a, c.body_b} <= bodies
             )
     count = min([len(times), *(len(p) for p in poses.values())]) if poses else 0
@@ -95,10 +109,16 @@ def load(bag: Path) -> BagContents:
 
 
 def draw_map(axes: Axes, scenario: Scenario) -> None:
+    """Draw the occupancy grid, axes in [m]."""
     grid = scenario.grid
     axes.imshow(
-        np.where(grid.occupied, 0.25, 1.0), origin="lower", extent=grid.extent, cmap="gray",
-        vmin=0.0, vmax=1.0, interpolation="nearest",
+        np.where(grid.occupied, 0.25, 1.0),
+        origin="lower",
+        extent=grid.extent,
+        cmap="gray",
+        vmin=0.0,
+        vmax=1.0,
+        interpolation="nearest",
     )
     axes.set_aspect("equal")
     axes.set_xlabel("x [m]")
@@ -112,6 +132,7 @@ def _body(axes: Axes, outline: Array, pose: Array, color: str, **style: Any) -> 
 
 
 def outlines_of(scenario: Scenario) -> dict[str, tuple[Array, str]]:
+    """Outline ``(n, 2)`` [m] and colour of every body by name."""
     result = {n: (r.outline, _ROBOT) for n, (r, _) in scenario.robots.items()}
     result.update({n: (o.geometry.outline, _OBJECT) for n, (o, _) in scenario.objects.items()})
     return result
@@ -219,7 +240,8 @@ def _animate(contents: BagContents, path: Path, frames: int = 90) -> None:
         axes.plot(*way.T, color=_PLAN, lw=0.8, ls="--")
     patches = {
         name: _body(axes, outline, contents.poses[name][0], color, facecolor=color, alpha=0.7)
-        for name, (outline, color) in outlines.items() if name in contents.poses
+        for name, (outline, color) in outlines.items()
+        if name in contents.poses
     }
     moments = np.linspace(0, len(contents.time) - 1, frames).astype(int)
 

@@ -42,7 +42,8 @@ def run_trials(
                 print(
                     f"[{len(rows):3d}/{len(tasks)}] {mark} {row.get('scenario', '')} "
                     f"seed {row.get('seed')}: {row.get('reason', '')} "
-                    f"({time.monotonic() - started:.0f} s)", flush=True,
+                    f"({time.monotonic() - started:.0f} s)",
+                    flush=True,
                 )
         except KeyboardInterrupt:
             print(f"interrupted: {len(rows)} of {len(tasks)} trials are kept", file=sys.stderr)
@@ -54,8 +55,12 @@ def guarded(trial: Trial, task: Any) -> Row:
     try:
         return trial(task)
     except Exception as error:
-        return {"scenario": getattr(task, "scenario", ""), "seed": getattr(task, "seed", None),
-                "success": False, "reason": f"{type(error).__name__}: {error}"}
+        return {
+            "scenario": getattr(task, "scenario", ""),
+            "seed": getattr(task, "seed", None),
+            "success": False,
+            "reason": f"{type(error).__name__}: {error}",
+        }
 
 
 def _results(
@@ -63,7 +68,8 @@ def _results(
 ) -> Iterator[tuple[int, Row]]:
     if scheduler:
         try:
-            from dask.distributed import Client, as_completed as dask_completed
+            from dask.distributed import Client
+            from dask.distributed import as_completed as dask_completed
         except ImportError:
             raise SystemExit("--scheduler needs Dask: pip install 'distributed'") from None
         client = Client(scheduler)

@@ -57,6 +57,6 @@ __all__ = [
     "se2",
     "shape_from_mapping",
     "shifted_limits",
-    "uniform_pressure_radius",
     "unicycle_step",
+    "uniform_pressure_radius",
 ]

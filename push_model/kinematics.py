@@ -58,8 +58,11 @@ def unicycle_step(state: Array, v: float, omega: float, dt: float) -> Array:
     half = 0.5 * omega * dt
     chord = v * dt * (math.sin(half) / half if abs(half) > 1e-9 else 1.0)
     return np.array(
-        [x + chord * math.cos(theta + half), y + chord * math.sin(theta + half),
-         wrap(theta + omega * dt)]
+        [
+            x + chord * math.cos(theta + half),
+            y + chord * math.sin(theta + half),
+            wrap(theta + omega * dt),
+        ]
     )
 
 

@@ -2,8 +2,8 @@
 
 Goyal, Ruina & Papadopoulos (1991); ellipsoid after Howe & Cutkosky (1996). All twists and wrenches
 are taken at the centre of mass: twist ``(vx, vy, omega)`` in [m/s, m/s, rad/s], wrench
-``(fx, fy, torque)`` in [N, N, Nm]. The wrench is the one that a pusher must apply to keep the motion
-going, i.e. minus the friction on the object.
+``(fx, fy, torque)`` in [N, N, Nm]. The wrench is the one that a pusher must apply to keep the
+motion going, i.e. minus the friction on the object.
 """
 
 import math
@@ -87,8 +87,8 @@ class PressureLimitSurface:
         """Uniform pressure over the shape, by a mid-point rule on a fan of triangles."""
         vertices = shape.outline
         m = max(2, round(math.sqrt(points / len(vertices))))
-        i, j = np.meshgrid(np.arange(m), np.arange(m), indexing="ij")
-        i, j = i.ravel(), j.ravel()
+        rows, columns = np.meshgrid(np.arange(m), np.arange(m), indexing="ij")
+        i, j = rows.ravel(), columns.ravel()
         up = np.column_stack([i + 1.0 / 3.0, j + 1.0 / 3.0])[i + j < m] / m
         down = np.column_stack([i + 2.0 / 3.0, j + 2.0 / 3.0])[i + j < m - 1] / m
         cells = np.vstack([up, down])

@@ -12,8 +12,11 @@ from push_model.specs import EnvironmentSpec
 
 @dataclass(frozen=True)
 class OccupancyGrid:
-    """occupied: ``(rows, columns)`` bool, row 0 at the lowest y; resolution [m]; origin ``(2,)`` [m]
-    of the lower left corner of cell (0, 0), world frame."""
+    """A grid of free and occupied cells.
+
+    occupied: ``(rows, columns)`` bool, row 0 at the lowest y; resolution: [m] of a cell;
+    origin: ``(2,)`` [m] of the lower left corner of cell (0, 0), world frame.
+    """
 
     occupied: NDArray[np.bool_]
     resolution: float
@@ -32,7 +35,7 @@ class OccupancyGrid:
         return x0 <= x < x1 and y0 <= y < y1
 
     def boundary_points(self, spacing: float) -> Array:
-        """``(n, 2)`` [m] centres of occupied cells beside free ones, thinned to about ``spacing``."""
+        """``(n, 2)`` [m] centres of occupied cells beside free ones, about ``spacing`` apart."""
         occupied = self.occupied
         padded = np.pad(occupied, 1, constant_values=True)
         inner = padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]

@@ -47,9 +47,7 @@ def compose(first: Array, second: Array) -> Array:
 def inverse(frame: Array) -> Array:
     """Pose ``(3,)`` of the parent seen from the frame."""
     c, s = math.cos(frame[2]), math.sin(frame[2])
-    return np.array(
-        [-c * frame[0] - s * frame[1], s * frame[0] - c * frame[1], wrap(-frame[2])]
-    )
+    return np.array([-c * frame[0] - s * frame[1], s * frame[0] - c * frame[1], wrap(-frame[2])])
 
 
 def between(first: Array, second: Array) -> Array:

@@ -25,7 +25,7 @@ def bounded(
     high: float = math.inf,
     doc: str = "",
 ) -> Any:
-    """A dataclass field whose value must lie in [low, high]; ``doc`` says what it is, in which unit."""
+    """A dataclass field with a value in [low, high]; ``doc`` says what it is, in which unit."""
     metadata = {"low": low, "high": high, "doc": doc}
     if default is dataclasses.MISSING:
         return dataclasses.field(metadata=metadata)
@@ -59,9 +59,7 @@ def from_mapping(cls: type[T], values: Mapping[str, Any] | None, where: str = "s
     for name, field in fields.items():
         if name in values:
             arguments[name] = convert(hints[name], values[name], f"{where}.{name}", field.metadata)
-        elif (
-            field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
-        ):
+        elif field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:
             raise SettingsError(f"{where}: missing key '{name}' ({_type_name(hints[name])})")
     try:
         return cls(**arguments)

@@ -214,7 +214,7 @@ def shape_from_mapping(values: Mapping[str, Any], where: str = "shape") -> Shape
         sizes = [float(v) for v in vars(spec).values()]
         if not all(0.0 < v < math.inf for v in sizes):
             raise SettingsError(f"sizes must be positive, got {sizes}")
-        return rectangle(*sizes) if isinstance(spec, _Rectangle) else ellipse(*sizes)
+        return (rectangle if isinstance(spec, _Rectangle) else ellipse)(sizes[0], sizes[1])
     except SettingsError as error:
         raise SettingsError(f"{where}.{kind}: {error}") from None
 

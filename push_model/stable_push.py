@@ -8,8 +8,8 @@ the curvature of the robot's path (section 2.1.1, Fig. 2.2).
 Two answers are given. ``curvature_limits`` is exact for a known limit surface. With one whose
 force direction follows the centre of mass (the ellipsoid) the friction limit has a closed form:
 the centre of mass, at (axle_distance + a, y) from the axle midpoint, moves along
-(1 - kappa y, kappa (axle_distance + a)), which must lie in the friction cone. For the centred object
-that is 1/kappa = (a + axle_distance)/mu; an offset y adds to the radius, as in (2.54).
+(1 - kappa y, kappa (axle_distance + a)), which must lie in the friction cone. For the centred
+object that is 1/kappa = (a + axle_distance)/mu; an offset y adds to the radius, as in (2.54).
 ``lynch_mason_stable`` is the construction that holds for every pressure distribution.
 """
 
@@ -81,13 +81,14 @@ def contact_on_side(side: Side, pusher_width: float, along: float | None = None)
     right = -min(side.length - along, half)
     if right >= left:
         raise ValueError(f"the bumper does not touch side {side.index}")
-    return PusherContact(
-        np.array([side.distance, along - foot]), right, left, -side.heading
-    )
+    return PusherContact(np.array([side.distance, along - foot]), right, left, -side.heading)
 
 
 def contact_margins(
-    curvature: float, contact: PusherContact, axle_distance: float, friction: float,
+    curvature: float,
+    contact: PusherContact,
+    axle_distance: float,
+    friction: float,
     surface: LimitSurface,
 ) -> tuple[float, float]:
     """How far a motion is from slipping and from tipping over an end of the contact.
@@ -110,7 +111,10 @@ def contact_margins(
 
 
 def curvature_limits(
-    contact: PusherContact, axle_distance: float, friction: float, surface: LimitSurface,
+    contact: PusherContact,
+    axle_distance: float,
+    friction: float,
+    surface: LimitSurface,
     tightest: float = 100.0,
 ) -> CurvatureLimits | None:
     """The interval of stable curvatures about the straight push, S3.

@@ -3,8 +3,10 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from push_model.arrays import Array
 from push_model.kinematics import DifferentialDrive
@@ -37,7 +39,7 @@ class Trajectory:
         """[s]."""
         return float(self.time[-1])
 
-    def sample(self, t: Array) -> tuple[Array, Array]:
+    def sample(self, t: NDArray[np.floating[Any]]) -> tuple[Array, Array]:
         """Poses ``(m, 3)`` and twists ``(m, 2)`` at times ``(m,)``; at rest beyond the ends."""
         index = np.searchsorted(self.time, t, side="right") - 1
         index = np.clip(index, 0, len(self.time) - 2)
@@ -99,8 +101,12 @@ def rotation(
 
 
 def along_curve(
-    points: Array, heading: Array, curvature: Array, drive: DifferentialDrive,
-    speed: float, acceleration: float,
+    points: Array,
+    heading: Array,
+    curvature: Array,
+    drive: DifferentialDrive,
+    speed: float,
+    acceleration: float,
 ) -> Trajectory:
     """Rest to rest along a smooth curve, as fast as the wheels and the limits allow.
 

@@ -88,8 +88,11 @@ class LtvMpc:
         circles: ``(m, 3)`` x, y, least distance of the axle midpoint; m <= max_obstacles.
         """
         started = time.thread_time()
-        if not (np.isfinite(error).all() and np.isfinite(reference.pose).all()
-                and np.isfinite(reference.twist).all()):
+        if not (
+            np.isfinite(error).all()
+            and np.isfinite(reference.pose).all()
+            and np.isfinite(reference.twist).all()
+        ):
             return self._failed("input is not finite", started)
         rows = self._assemble(error, reference, limits, circles)
         z, status = self._optimise(rows)
@@ -112,16 +115,41 @@ class LtvMpc:
         s = self.settings
         twist = np.ascontiguousarray(reference.twist)
         condense(
-            error, self._nominal, self._previous, twist, s.step, self._Q, self._P, self._R,
-            self._Rd, s.slack_linear, s.slack_quadratic, self._H, self._f, self._S, self._g,
+            error,
+            self._nominal,
+            self._previous,
+            twist,
+            s.step,
+            self._Q,
+            self._P,
+            self._R,
+            self._Rd,
+            s.slack_linear,
+            s.slack_quadratic,
+            self._H,
+            self._f,
+            self._S,
+            self._g,
             self._rollout,
         )
         low, high = (0.0, 0.0) if limits is None else (limits.minimum, limits.maximum)
         return int(
             constraint_rows(
-                self._S, self._g, twist, self._rollout, reference.pose, self._previous,
-                self._change, self.drive.half_track, self.drive.max_speed, limits is not None,
-                low, high, circles, self._G, self._b,
+                self._S,
+                self._g,
+                twist,
+                self._rollout,
+                reference.pose,
+                self._previous,
+                self._change,
+                self.drive.half_track,
+                self.drive.max_speed,
+                limits is not None,
+                low,
+                high,
+                circles,
+                self._G,
+                self._b,
             )
         )
 

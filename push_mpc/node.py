@@ -12,8 +12,6 @@ from std_msgs.msg import Header
 from push_model.kinematics import unicycle_step
 from push_model.settings import SettingsError
 from push_model.stable_push import CurvatureLimits
-from push_msgs.action import FollowTrajectory
-from push_msgs.msg import ControllerStatus, NamedPoses
 from push_mpc import (
     LtvMpc,
     MpcSettings,
@@ -21,9 +19,10 @@ from push_mpc import (
     Task,
     Tick,
     TrackerSettings,
-    TrackError,
     TrajectoryTracker,
 )
+from push_msgs.action import FollowTrajectory
+from push_msgs.msg import ControllerStatus, NamedPoses
 from push_ros.actions import GoalServer
 from push_ros.conversions import (
     circles_from_ros,
@@ -61,14 +60,19 @@ class ControllerNode(Node):
             self, MpcSettings, sections["mpc"], "mpc", "controller.mpc", self._apply_mpc
         )
         self._tracker_settings = declare_settings(
-            self, TrackerSettings, sections["tracker"], "tracker", "controller.tracker",
+            self,
+            TrackerSettings,
+            sections["tracker"],
+            "tracker",
+            "controller.tracker",
             self._apply_tracker,
         )
         self._tracker: TrajectoryTracker | None = None
         self._rebuild()
         self._poses = PoseTracker(
-            declare_settings(self, PoseTrackerSettings, sections["poses"], "poses",
-                             "controller.poses")
+            declare_settings(
+                self, PoseTrackerSettings, sections["poses"], "poses", "controller.poses"
+            )
         )
         self._object = ""
         self._heartbeat = 0.0
@@ -87,15 +91,22 @@ class ControllerNode(Node):
             ControllerStatus, "/controller/status", STATUS
         )
         self._server = GoalServer(
-            self, FollowTrajectory, f"/{self.robot}/follow_trajectory", check=self._parse,
-            start=self._begin, cancel=self._canceled,
+            self,
+            FollowTrajectory,
+            f"/{self.robot}/follow_trajectory",
+            check=self._parse,
+            start=self._begin,
+            cancel=self._canceled,
             preempted=lambda: self._result(
                 FollowTrajectory.Result.PREEMPTED, "a new trajectory replaces this one"
             ),
         )
         self.create_subscription(Header, f"/{self.robot}/heartbeat", self._on_heartbeat, STREAM)
         self.create_subscription(
-            NamedPoses, "/poses", self._on_poses, STREAM,
+            NamedPoses,
+            "/poses",
+            self._on_poses,
+            STREAM,
             event_callbacks=self._diagnostics.subscription_events("/poses"),
         )
         self._watchdog = self.create_timer(
@@ -144,8 +155,11 @@ class ControllerNode(Node):
             raise InvalidMessage("a tolerance must not be negative")
         s = self._tracker_settings
         return Task(
-            trajectory, push, circles_from_ros(request.obstacles),
-            tolerances[0] or s.position_tolerance, tolerances[1] or s.orientation_tolerance,
+            trajectory,
+            push,
+            circles_from_ros(request.obstacles),
+            tolerances[0] or s.position_tolerance,
+            tolerances[1] or s.orientation_tolerance,
         ), float(request.heartbeat_timeout)
 
     def _begin(self, request: Any) -> None:
@@ -235,8 +249,10 @@ class ControllerNode(Node):
         tick = tracker.tick(dt, robot, item if self._object in seen else None)
         self._publish_command(tick.v, tick.omega)
         failed = tick.solve is not None and not tick.solve.solved
-        self._mode = ControllerStatus.FALLBACK if failed else (
-            ControllerStatus.PUSH if self._object else ControllerStatus.MOVE
+        self._mode = (
+            ControllerStatus.FALLBACK
+            if failed
+            else (ControllerStatus.PUSH if self._object else ControllerStatus.MOVE)
         )
         self._reason = tick.solve.reason if failed and tick.solve else "following a trajectory"
         self._publish_status(tick)
@@ -246,7 +262,8 @@ class ControllerNode(Node):
         elif self._ticks % 10 == 0:
             self._server.feedback(
                 FollowTrajectory.Feedback(
-                    progress=tick.progress, position_error=tick.position_error,
+                    progress=tick.progress,
+                    position_error=tick.position_error,
                     orientation_error=tick.orientation_error,
                 )
             )
@@ -258,14 +275,23 @@ class ControllerNode(Node):
 
     def _publish_status(self, tick: Tick | None) -> None:
         message = ControllerStatus(
-            mode=self._mode, robot=self.robot, reason=self._reason, solves=self.tracker.solves,
-            failures=self.tracker.failures, curvature_margin=math.inf, obstacle_margin=math.inf,
+            mode=self._mode,
+            robot=self.robot,
+            reason=self._reason,
+            solves=self.tracker.solves,
+            failures=self.tracker.failures,
+            curvature_margin=math.inf,
+            obstacle_margin=math.inf,
         )
         message.header.stamp = self._last_stamp
         message.header.frame_id = "map"
         if tick is not None:
             e = tick.error
-            message.error_x, message.error_y, message.error_theta = float(e[0]), float(e[1]), float(e[2])
+            message.error_x, message.error_y, message.error_theta = (
+                float(e[0]),
+                float(e[1]),
+                float(e[2]),
+            )
             message.error_v, message.error_omega = float(e[3]), float(e[4])
             message.v, message.omega = tick.v, tick.omega
             message.curvature_margin = tick.curvature_margin
@@ -292,7 +318,11 @@ class ControllerNode(Node):
     def _state(self) -> dict[str, Any]:
         stale = self.tracker.active and time.monotonic() - self._last_wall > 0.3
         return {
-            "mode": self._mode, "reason": self._reason, "solves": self.tracker.solves,
-            "failures": self.tracker.failures, "poses refused": self._poses.refused,
-            "pose jumps": self._poses.jumps, "warning": "poses are stale" if stale else "",
+            "mode": self._mode,
+            "reason": self._reason,
+            "solves": self.tracker.solves,
+            "failures": self.tracker.failures,
+            "poses refused": self._poses.refused,
+            "pose jumps": self._poses.jumps,
+            "warning": "poses are stale" if stale else "",
         }

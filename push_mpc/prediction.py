@@ -19,8 +19,9 @@ SLACKS = 3
 
 
 @numba.njit(cache=True, fastmath=True)
-def _rates(e: Any, a: float, eps: float, vd: float, wd: float, od: float, va: float, oa: float,
-           out: Any) -> None:
+def _rates(
+    e: Any, a: float, eps: float, vd: float, wd: float, od: float, va: float, oa: float, out: Any
+) -> None:
     """(2.38)."""
     v = e[3] + vd
     out[0] = math.cos(e[2]) * v - vd + e[1] * od
@@ -31,8 +32,20 @@ def _rates(e: Any, a: float, eps: float, vd: float, wd: float, od: float, va: fl
 
 
 @numba.njit(cache=True, fastmath=True)
-def _integrate(e: Any, a: float, eps: float, vd0: float, vd1: float, wd: float, od0: float,
-               od1: float, h: float, out: Any, k: Any, mid: Any) -> None:
+def _integrate(
+    e: Any,
+    a: float,
+    eps: float,
+    vd0: float,
+    vd1: float,
+    wd: float,
+    od0: float,
+    od1: float,
+    h: float,
+    out: Any,
+    k: Any,
+    mid: Any,
+) -> None:
     """One RK4 step with a reference that changes linearly."""
     va, oa = (vd1 - vd0) / h, (od1 - od0) / h
     vm, om = 0.5 * (vd0 + vd1), 0.5 * (od0 + od1)
@@ -108,9 +121,22 @@ def discretise(theta: float, v: float, od: float, h: float, A: Any, B: Any) -> N
 
 @numba.njit(cache=True, fastmath=True)
 def condense(
-    e0: Any, nominal: Any, previous: Any, ref: Any, h: float, Q: Any, P: Any, R: Any, Rd: Any,
-    slack_linear: float, slack_quadratic: float,
-    H: Any, f: Any, S: Any, g: Any, rollout: Any,
+    e0: Any,
+    nominal: Any,
+    previous: Any,
+    ref: Any,
+    h: float,
+    Q: Any,
+    P: Any,
+    R: Any,
+    Rd: Any,
+    slack_linear: float,
+    slack_quadratic: float,
+    H: Any,
+    f: Any,
+    S: Any,
+    g: Any,
+    rollout: Any,
 ) -> None:
     """Cost (2.52) as 1/2 z'Hz + f'z with z = (u_0 .. u_{p-1}, slacks).
 
@@ -134,8 +160,18 @@ def condense(
     rollout[0] = e0
     for k in range(p):
         _integrate(
-            rollout[k], nominal[k, 0], nominal[k, 1], ref[k, 0], ref[k + 1, 0],
-            0.5 * (ref[k, 1] + ref[k + 1, 1]), ref[k, 2], ref[k + 1, 2], h, rollout[k + 1], k4, mid,
+            rollout[k],
+            nominal[k, 0],
+            nominal[k, 1],
+            ref[k, 0],
+            ref[k + 1, 0],
+            0.5 * (ref[k, 1] + ref[k + 1, 1]),
+            ref[k, 2],
+            ref[k + 1, 2],
+            h,
+            rollout[k + 1],
+            k4,
+            mid,
         )
         theta = 0.5 * (rollout[k, 2] + rollout[k + 1, 2])
         v = 0.5 * (rollout[k, 3] + rollout[k + 1, 3] + ref[k, 0] + ref[k + 1, 0])
@@ -184,15 +220,27 @@ def condense(
 
 @numba.njit(cache=True, fastmath=True)
 def constraint_rows(
-    S: Any, g: Any, ref: Any, rollout: Any, poses: Any, previous: Any, change: Any,
-    half_track: float, max_speed: float, push: bool, low: float, high: float,
-    circles: Any, G: Any, b: Any,
+    S: Any,
+    g: Any,
+    ref: Any,
+    rollout: Any,
+    poses: Any,
+    previous: Any,
+    change: Any,
+    half_track: float,
+    max_speed: float,
+    push: bool,
+    low: float,
+    high: float,
+    circles: Any,
+    G: Any,
+    b: Any,
 ) -> int:
     """Rows G z <= b (2.50b)-(2.50e); returns how many.
 
     Families in order: wheel speeds (4 a step; v >= 0 in a push replaces the reverse ones), changes
-    of the input (4 a step), curvature (2.57) (2 a step, in a push), obstacles (2.61) (one a step and
-    circle). Every family but the input changes has a slack of its own.
+    of the input (4 a step), curvature (2.57) (2 a step, in a push), obstacles (2.61) (one a step
+    and circle). Every family but the input changes has a slack of its own.
 
     poses: ``(p + 1, 3)`` of the reference; circles: ``(m, 3)`` x, y, least distance of the robot.
     """
@@ -204,8 +252,10 @@ def constraint_rows(
         for turn in (1.0, -1.0):
             for c in range(end):
                 G[row, c] = S[k, 3, c] + turn * half_track * S[k, 4, c]
-            b[row] = max_speed - (g[k, 3] + ref[k + 1, 0]) - turn * half_track * (
-                g[k, 4] + ref[k + 1, 2]
+            b[row] = (
+                max_speed
+                - (g[k, 3] + ref[k + 1, 0])
+                - turn * half_track * (g[k, 4] + ref[k + 1, 2])
             )
             for c in range(end, n):
                 G[row, c] = 0.0
@@ -268,8 +318,11 @@ def constraint_rows(
                 G[row, c] = 0.0
             G[row, n + 2] = -1.0
             b[row] = (
-                nx * (circles[m, 0] - x) + ny * (circles[m, 1] - y) - circles[m, 2]
-                - ax * g[k, 0] - ay * g[k, 1]
+                nx * (circles[m, 0] - x)
+                + ny * (circles[m, 1] - y)
+                - circles[m, 2]
+                - ax * g[k, 0]
+                - ay * g[k, 1]
             )
             row += 1
     return row

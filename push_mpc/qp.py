@@ -29,7 +29,7 @@ class QpBackend(Protocol):
     row_generation: bool
 
     def solve(self, H: Array, f: Array, G: Array, b: Array, low: Array, high: Array) -> QpSolution:
-        """H ``(n, n)`` positive definite, f ``(n,)``, G ``(m, n)``, b ``(m,)``, low, high ``(n,)``."""
+        """H ``(n, n)`` positive definite, f, low, high ``(n,)``, G ``(m, n)``, b ``(m,)``."""
         ...
 
 
@@ -56,7 +56,10 @@ class OsqpBackend:
 
     def __init__(self, tolerance: float = 1e-5, polish: bool = True) -> None:
         self._options = {
-            "eps_abs": tolerance, "eps_rel": tolerance, "polishing": polish, "verbose": False,
+            "eps_abs": tolerance,
+            "eps_rel": tolerance,
+            "polishing": polish,
+            "verbose": False,
             "max_iter": 20000,
         }
 
@@ -66,8 +69,12 @@ class OsqpBackend:
         solver = osqp.OSQP()
         rows = sparse.vstack([sparse.csc_matrix(G), sparse.eye(n, format="csc")], format="csc")
         solver.setup(
-            sparse.triu(sparse.csc_matrix(H), format="csc"), f, rows,
-            np.concatenate([np.full(m, -np.inf), low]), np.concatenate([b, high]), **self._options,
+            sparse.triu(sparse.csc_matrix(H), format="csc"),
+            f,
+            rows,
+            np.concatenate([np.full(m, -np.inf), low]),
+            np.concatenate([b, high]),
+            **self._options,
         )
         result = solver.solve()
         z = np.zeros(n) if result.x is None else np.asarray(result.x)

@@ -141,8 +141,10 @@ class TrajectoryTracker:
         error = self._error(robot, reference)
         gap, turn = self._final_errors(task, robot, item)
         margin = self._obstacle_margin(task, robot)
-        offset = 0.0 if task.push is None or self._grasp is None else float(
-            self._grasp[1] - task.push.grasp[1]
+        offset = (
+            0.0
+            if task.push is None or self._grasp is None
+            else float(self._grasp[1] - task.push.grasp[1])
         )
         limits = None
         if task.push is not None:
@@ -172,9 +174,19 @@ class TrajectoryTracker:
             curvature_margin = min(limits.maximum - kappa, kappa - limits.minimum)
         del rate
         return Tick(
-            self.v, self.omega, finished, code, message, error,
-            min(1.0, self._time / task.trajectory.duration), gap, turn, solve,
-            curvature_margin, margin, offset,
+            self.v,
+            self.omega,
+            finished,
+            code,
+            message,
+            error,
+            min(1.0, self._time / task.trajectory.duration),
+            gap,
+            turn,
+            solve,
+            curvature_margin,
+            margin,
+            offset,
         )
 
     def _without_delay(self, robot: Array, dt: float) -> Array:
@@ -259,13 +271,10 @@ class TrajectoryTracker:
 
     def _good_enough(self, task: Task, gap: float, turn: float, factor: float) -> bool:
         return (
-            gap <= factor * task.position_tolerance
-            and turn <= factor * task.orientation_tolerance
+            gap <= factor * task.position_tolerance and turn <= factor * task.orientation_tolerance
         )
 
-    def _check(
-        self, task: Task, dt: float, robot: Array, error: Array
-    ) -> tuple[TrackError, str]:
+    def _check(self, task: Task, dt: float, robot: Array, error: Array) -> tuple[TrackError, str]:
         s = self.settings
         off = float(np.hypot(error[0], error[1]))
         if off > s.off_course:

@@ -1,6 +1,7 @@
 """Distance to the nearest obstacle, everywhere on an occupancy grid."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numba
@@ -29,8 +30,14 @@ def _lookup(field: Any, x: float, y: float, ox: float, oy: float, scale: float) 
 
 @numba.njit(cache=True, fastmath=True)
 def _points_clearance(
-    field: Any, points: Any, x: float, y: float, theta: float,
-    ox: float, oy: float, scale: float,
+    field: Any,
+    points: Any,
+    x: float,
+    y: float,
+    theta: float,
+    ox: float,
+    oy: float,
+    scale: float,
 ) -> float:
     c, s = math.cos(theta), math.sin(theta)
     least = 1e9
@@ -40,13 +47,20 @@ def _points_clearance(
         d = _lookup(field, px, py, ox, oy, scale)
         if d < least:
             least = d
-    return least
+    return float(least)
 
 
 @numba.njit(cache=True, fastmath=True)
 def _segment_clearance(
-    field: Any, x0: float, y0: float, x1: float, y1: float,
-    ox: float, oy: float, scale: float, enough: float,
+    field: Any,
+    x0: float,
+    y0: float,
+    x1: float,
+    y1: float,
+    ox: float,
+    oy: float,
+    scale: float,
+    enough: float,
 ) -> float:
     """Least distance along a segment, by steps of a cell; stops once it is below ``enough``."""
     length = math.hypot(x1 - x0, y1 - y0)
@@ -58,8 +72,8 @@ def _segment_clearance(
         if d < least:
             least = d
             if least < enough:
-                return least
-    return least
+                return float(least)
+    return float(least)
 
 
 class DistanceField:
@@ -78,14 +92,12 @@ class DistanceField:
 
     def clearance(self, outline: Array, pose: Array) -> float:
         """[m] of an outline ``(n, 2)`` placed at a pose ``(3,)``."""
-        return float(
-            _points_clearance(self.values, outline, pose[0], pose[1], pose[2], *self.args)
-        )
+        return float(_points_clearance(self.values, outline, pose[0], pose[1], pose[2], *self.args))
 
-    def segment(self, start: Array, end: Array, enough: float = -1.0) -> float:
+    def segment(
+        self, start: Sequence[float] | Array, end: Sequence[float] | Array, enough: float = -1.0
+    ) -> float:
         """[m] least distance along a segment between points ``(2,)``."""
         return float(
-            _segment_clearance(
-                self.values, start[0], start[1], end[0], end[1], *self.args, enough
-            )
+            _segment_clearance(self.values, start[0], start[1], end[0], end[1], *self.args, enough)
         )

@@ -51,8 +51,13 @@ class _Motion(ob.MotionValidator):  # type: ignore[misc]
 
 
 def shortest_path(
-    field: DistanceField, start: Array, goal: Array, clearance: float, iterations: int,
-    extension: float, seed: int,
+    field: DistanceField,
+    start: Array,
+    goal: Array,
+    clearance: float,
+    iterations: int,
+    extension: float,
+    seed: int,
 ) -> Array | None:
     """RRT* over R^2: points ``(n, 2)`` [m] whose segments keep a clearance [m], or None."""
     x0, x1, y0, y1 = field.grid.extent
@@ -102,15 +107,17 @@ def _shortcut(field: DistanceField, points: Array, clearance: float) -> Array:
 def path_cost(field: DistanceField, points: Array, settings: PlannerSettings) -> GuidePath:
     """(2.1) of a path ``(n, 2)``."""
     length = float(np.hypot(*np.diff(points, axis=0).T).sum())
-    clearance = min(
-        field.segment(a, b) for a, b in zip(points[:-1], points[1:], strict=True)
-    )
+    clearance = min(field.segment(a, b) for a, b in zip(points[:-1], points[1:], strict=True))
     cost = settings.length_weight * length + settings.clearance_weight / max(clearance, 1e-6)
     return GuidePath(points, cost, length, clearance)
 
 
 def guide_paths(
-    field: DistanceField, start: Array, goal: Array, least: float, settings: PlannerSettings,
+    field: DistanceField,
+    start: Array,
+    goal: Array,
+    least: float,
+    settings: PlannerSettings,
     seed: int,
 ) -> Iterator[GuidePath]:
     """The sweep: a path for each clearance threshold, from the widest down.

@@ -49,7 +49,10 @@ class PlannerNode(Node):
         name = self.declare_parameter("scenario", "env1-target1").value
         self._scenario = scenario or load_scenario(str(name))
         self.settings = declare_settings(
-            self, PlannerSettings, self._scenario.parameters.get("planner", {}), where="planner",
+            self,
+            PlannerSettings,
+            self._scenario.parameters.get("planner", {}),
+            where="planner",
             apply=self._apply,
         )
         self._planners: dict[tuple[str, str], PushPlanner] = {}
@@ -63,11 +66,18 @@ class PlannerNode(Node):
         self._plan_publisher = self.create_publisher(PlanMessage, "/push_plan", LATCHED)
         self._path_publisher = self.create_publisher(Path, "/push_path", LATCHED)
         self.create_subscription(
-            OccupancyGrid, "/map", self._on_map, LATCHED,
+            OccupancyGrid,
+            "/map",
+            self._on_map,
+            LATCHED,
             event_callbacks=self._diagnostics.subscription_events("/map"),
         )
         self._server = GoalServer(
-            self, PlanPush, "/plan_push", check=lambda request: None, start=self._begin,
+            self,
+            PlanPush,
+            "/plan_push",
+            check=lambda request: None,
+            start=self._begin,
             cancel=self._canceled,
             preempted=lambda: PlanPush.Result(
                 error_code=PlanPush.Result.CANCELED, error_msg="a new request replaces this one"
@@ -120,7 +130,9 @@ class PlannerNode(Node):
         start = next(iter(self._scenario.objects.values()))[1]
         planner = self._planner("", "")
         quick = replace(planner.settings, improvement_rounds=0, rrt_iterations=50, max_expansions=2)
-        trial = PushPlanner(quick, planner.scene.field.grid, planner.scene.robot, planner.scene.item)
+        trial = PushPlanner(
+            quick, planner.scene.field.grid, planner.scene.robot, planner.scene.item
+        )
         ahead = start + np.array([0.3 * np.cos(start[2]), 0.3 * np.sin(start[2]), 0.0])
         try:
             trial.solve(start, ahead)
@@ -216,7 +228,11 @@ class PlannerNode(Node):
             start, goal = planar_pose(request.start, "start"), planar_pose(request.goal, "goal")
             planner = self._planner("", "")
             trajectory = plan_robot_path(
-                planner.scene.field, planner.scene.robot, self.settings, start, goal,
+                planner.scene.field,
+                planner.scene.robot,
+                self.settings,
+                start,
+                goal,
                 circles_from_ros(request.obstacles),
             )
             response.error_code = response.NONE
@@ -229,7 +245,9 @@ class PlannerNode(Node):
 
     def _state(self) -> dict[str, Any]:
         return {
-            "plans": self.plans, "failures": self.failures, "planning": self._work is not None,
+            "plans": self.plans,
+            "failures": self.failures,
+            "planning": self._work is not None,
             "last plan time": f"{self.last_time:.3f} s",
             "warning": "" if self._grid is not None else "no map yet",
         }

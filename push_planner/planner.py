@@ -1,4 +1,4 @@
-"""The two layers together: from start and goal pose to a plan of pushes, improving while asked to."""
+"""The two layers together: from start and goal pose to a plan of pushes that keeps improving."""
 
 import time
 from collections.abc import Iterator
@@ -162,8 +162,14 @@ class PushPlanner:
                     setattr(totals, name, getattr(totals, name) + getattr(search.statistics, name))
                 if search.solution is not None:
                     statistics = PlanStatistics(
-                        iterations, totals.expanded, totals.generated, totals.solved,
-                        totals.feasible, guide.cost, guide.length, guide.clearance,
+                        iterations,
+                        totals.expanded,
+                        totals.generated,
+                        totals.solved,
+                        totals.feasible,
+                        guide.cost,
+                        guide.length,
+                        guide.clearance,
                         time.perf_counter() - clock,
                     )
                     best = self._assemble(search.solution, search.cost, goal, guide, statistics)
@@ -204,16 +210,29 @@ class PushPlanner:
         count = max(20, int(step.curve.length / 0.005))
         points, heading, curvature = step.curve.sample(count)
         trajectory = along_curve(
-            points, heading, curvature, self.scene.robot.drive, self.settings.push_speed,
+            points,
+            heading,
+            curvature,
+            self.scene.robot.drive,
+            self.settings.push_speed,
             self.settings.push_acceleration,
         )
         return PushSegment(
-            step.side, step.curve, step.object_start, step.object_end,
-            self.scene.standoff(step.curve.start), step.clearance, trajectory,
+            step.side,
+            step.curve,
+            step.object_start,
+            step.object_end,
+            self.scene.standoff(step.curve.start),
+            step.clearance,
+            trajectory,
         )
 
     def _assemble(
-        self, steps: tuple[PushStep, ...], cost: float, goal: Array, guide: GuidePath,
+        self,
+        steps: tuple[PushStep, ...],
+        cost: float,
+        goal: Array,
+        guide: GuidePath,
         statistics: PlanStatistics,
     ) -> PushPlan:
         segments = tuple(self.segment(step) for step in steps)

@@ -15,8 +15,12 @@ from push_planner.push_search import PushStep
 
 
 def preemptive_pushes(
-    planner: PushPlanner, start: Array, goal: Array, seed: int,
-    lengths: tuple[float, ...] = (0.15, 0.3, 0.5), curvatures: int = 3,
+    planner: PushPlanner,
+    start: Array,
+    goal: Array,
+    seed: int,
+    lengths: tuple[float, ...] = (0.15, 0.3, 0.5),
+    curvatures: int = 3,
 ) -> list[PushSegment]:
     """Constant-curvature pushes of the object from ``start`` ``(3,)`` that collide with nothing.
 
@@ -36,9 +40,7 @@ def preemptive_pushes(
         for curvature in [0.0, *drawn]:
             for length in lengths:
                 end = unicycle_step(begin, length, length * curvature, 1.0)
-                curve = shortest_push_curve(
-                    begin, end, side.trusted.minimum, side.trusted.maximum
-                )
+                curve = shortest_push_curve(begin, end, side.trusted.minimum, side.trusted.maximum)
                 if curve is None or not scene.has_room(end):
                     continue
                 clearance = scene.curve_clearance(curve, side, needed)

@@ -25,9 +25,7 @@ def _basis(n: int) -> Array:
     s = np.linspace(0.0, 1.0, n)
     f1, g1 = 3 * s**2 - 2 * s, (s - 1) ** 2 + 2 * s * (s - 1)
     f2, g2 = 6 * s - 2, 6 * s - 4
-    return np.ascontiguousarray(
-        np.array([3 * s**2 - 3 * f1, f1, g1, 6 * s - 3 * f2, f2, g2]).T
-    )
+    return np.ascontiguousarray(np.array([3 * s**2 - 3 * f1, f1, g1, 6 * s - 3 * f2, f2, g2]).T)
 
 
 _BASIS_COARSE, _BASIS_DENSE = _basis(_COARSE), _basis(_DENSE)
@@ -35,8 +33,15 @@ _BASIS_COARSE, _BASIS_DENSE = _basis(_COARSE), _basis(_DENSE)
 
 @numba.njit(cache=True, fastmath=True)
 def _evaluate(
-    ki: float, kf: float, x: float, y: float, c: float, s: float,
-    low: float, high: float, basis: Any,
+    ki: float,
+    kf: float,
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    low: float,
+    high: float,
+    basis: Any,
 ) -> tuple[float, float]:
     """Arc length [m] (2.5) and worst curvature violation [1/m] (2.7)."""
     n = basis.shape[0]
@@ -62,8 +67,17 @@ def _evaluate(
 
 @numba.njit(cache=True, fastmath=True)
 def _refine(
-    ki: float, kf: float, best: float, step: float, x: float, y: float, c: float, s: float,
-    low: float, high: float, basis: Any,
+    ki: float,
+    kf: float,
+    best: float,
+    step: float,
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    low: float,
+    high: float,
+    basis: Any,
 ) -> tuple[float, float, float]:
     """Compass search for the shortest feasible curve, in log(k)."""
     while step > 1e-3:
@@ -83,8 +97,17 @@ def _refine(
 
 @numba.njit(cache=True, fastmath=True)
 def _reduce_violation(
-    ki: float, kf: float, worst: float, step: float, x: float, y: float, c: float, s: float,
-    low: float, high: float, basis: Any,
+    ki: float,
+    kf: float,
+    worst: float,
+    step: float,
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    low: float,
+    high: float,
+    basis: Any,
 ) -> tuple[float, float, float]:
     """Compass search for a feasible curve; ends as soon as there is one."""
     while step > 1e-3 and worst > 0.0:
@@ -148,9 +171,7 @@ def _solve(
         if worst > 0.0:
             break
         best, _ = _evaluate(ki, kf, x, y, c, s, low, high, coarse)
-        ki, kf, best = _refine(
-            ki, kf, best, 0.05, x, y, c, s, tight_low, tight_high, coarse
-        )
+        ki, kf, best = _refine(ki, kf, best, 0.05, x, y, c, s, tight_low, tight_high, coarse)
     length, violation = _evaluate(ki, kf, x, y, c, s, low, high, dense)
     return ki, kf, length, violation <= 0.0
 
@@ -175,8 +196,10 @@ class PushCurve:
         beta = self.k_start * direction_i + 3.0 * pi
         points = s**3 * pf - (s - 1) ** 3 * pi + alpha * s**2 * (s - 1) + beta * s * (s - 1) ** 2
         first = (
-            3 * s**2 * pf - 3 * (s - 1) ** 2 * pi
-            + alpha * (3 * s**2 - 2 * s) + beta * ((s - 1) ** 2 + 2 * s * (s - 1))
+            3 * s**2 * pf
+            - 3 * (s - 1) ** 2 * pi
+            + alpha * (3 * s**2 - 2 * s)
+            + beta * ((s - 1) ** 2 + 2 * s * (s - 1))
         )
         second = 6 * s * pf - 6 * (s - 1) * pi + alpha * (6 * s - 2) + beta * (6 * s - 4)
         speed = np.hypot(*first.T)
@@ -205,7 +228,13 @@ def shortest_push_curve(
     dx, dy = end[0] - start[0], end[1] - start[1]
     turn = end[2] - start[2]
     ki, kf, length, feasible = _solve(
-        c * dx + s * dy, -s * dx + c * dy, math.cos(turn), math.sin(turn),
-        curvature_min, curvature_max, _BASIS_COARSE, _BASIS_DENSE,
+        c * dx + s * dy,
+        -s * dx + c * dy,
+        math.cos(turn),
+        math.sin(turn),
+        curvature_min,
+        curvature_max,
+        _BASIS_COARSE,
+        _BASIS_DENSE,
     )
     return PushCurve(start, end, ki, kf, length) if feasible else None

@@ -76,9 +76,13 @@ class PushSearch:
         root = _Node(self.goal, (last, -1), None, 0.0, math.inf)
         counter = itertools.count()
         # h of (2.11); for the straight runs off Gamma, the distance to the start
-        rest = [np.zeros(1), self._distances(poses[1]), *(np.full(len(p), w) for p, w in
-                zip(poses[2:-2], way[1:-1], strict=True)), self._distances(poses[-2]),
-                np.full(1, way[-1])]
+        rest = [
+            np.zeros(1),
+            self._distances(poses[1]),
+            *(np.full(len(p), w) for p, w in zip(poses[2:-2], way[1:-1], strict=True)),
+            self._distances(poses[-2]),
+            np.full(1, way[-1]),
+        ]
         queue = [(float(way[-1]), next(counter), root)]
         settled: set[tuple[int, int, int]] = set()
         while queue and self.statistics.expanded < settings.max_expansions:
@@ -120,7 +124,9 @@ class PushSearch:
                     result.append(place)
         return result
 
-    def _poses(self, points: Array, headings: Array, settings: PlannerSettings) -> list[list[Array]]:
+    def _poses(
+        self, points: Array, headings: Array, settings: PlannerSettings
+    ) -> list[list[Array]]:
         """Object poses at each waypoint: one of its sides faces along Gamma, or nearly so."""
         result = [[self.start]]
         for point, heading in zip(points[1:-1], headings[1:-1], strict=True):
@@ -155,7 +161,9 @@ class PushSearch:
             if successful >= self.scene.settings.successor_waypoints:
                 return
 
-    def _push(self, pose: Array, place: tuple[int, int], side: PushSide, node: _Node) -> _Node | None:
+    def _push(
+        self, pose: Array, place: tuple[int, int], side: PushSide, node: _Node
+    ) -> _Node | None:
         start, end = side.robot_pose(pose), side.robot_pose(node.pose)
         if not _worth_trying(start, end):
             return None

@@ -35,7 +35,11 @@ class NoRobotPath(Exception):
 
 
 def plan_robot_path(
-    field: DistanceField, robot: RobotSpec, settings: PlannerSettings, start: Array, goal: Array,
+    field: DistanceField,
+    robot: RobotSpec,
+    settings: PlannerSettings,
+    start: Array,
+    goal: Array,
     circles: Array,
 ) -> Trajectory:
     """Shortest way that keeps the robot's turning circle clear of the map and of circles.
@@ -64,7 +68,9 @@ def plan_robot_path(
     if ends[0] < -slack:
         raise NoRobotPath(RobotPathError.START_BLOCKED, "the robot stands too close to an obstacle")
     if ends[1] < -slack:
-        raise NoRobotPath(RobotPathError.GOAL_BLOCKED, "the robot's goal is too close to an obstacle")
+        raise NoRobotPath(
+            RobotPathError.GOAL_BLOCKED, "the robot's goal is too close to an obstacle"
+        )
     points = _grid_path(field, start, goal, circles, robot.footprint_radius + needed, needed)
     points = _straighten(points, field, circles, robot.footprint_radius + needed, needed)
     return _drive(points, start, goal, settings)

@@ -25,8 +25,16 @@ _SWEEP_SPACING = 0.01  # [m]
 
 @numba.njit(cache=True, fastmath=True)
 def _sweep(
-    field: Any, robots: Any, robot_points: Any, object_points: Any, object_radius: float,
-    offset: Any, needed: float, ox: float, oy: float, scale: float,
+    field: Any,
+    robots: Any,
+    robot_points: Any,
+    object_points: Any,
+    object_radius: float,
+    offset: Any,
+    needed: float,
+    ox: float,
+    oy: float,
+    scale: float,
 ) -> float:
     """Least clearance of robot and object over robot poses (n, 3); stops below ``needed``."""
     least = 1e9
@@ -42,8 +50,8 @@ def _sweep(
             d = min(d, e)
         least = min(least, d)
         if least < needed:
-            return least
-    return least
+            return float(least)
+    return float(least)
 
 
 @dataclass(frozen=True)
@@ -76,9 +84,7 @@ def push_sides(robot: RobotSpec, item: ObjectSpec, friction_trust: float) -> tup
     sides = []
     for side in item.geometry.sides:
         contact = contact_on_side(side, robot.bumper.width)
-        limits = curvature_limits(
-            contact, robot.bumper.distance, item.contact_friction, surface
-        )
+        limits = curvature_limits(contact, robot.bumper.distance, item.contact_friction, surface)
         if limits is not None:
             grasp = contact.object_pose + np.array([robot.bumper.distance, 0.0, 0.0])
             sides.append(
@@ -121,8 +127,14 @@ class PushScene:
         """[m] least clearance of robot and object over robot poses ``(n, 3)``."""
         return float(
             _sweep(
-                self.field.values, robots, self._robot_points, self._object_points,
-                self.shape.circumradius, side.grasp, needed, *self.field.args,
+                self.field.values,
+                robots,
+                self._robot_points,
+                self._object_points,
+                self.shape.circumradius,
+                side.grasp,
+                needed,
+                *self.field.args,
             )
         )
 

@@ -1,7 +1,7 @@
 """Long jobs as actions, without blocking an executor.
 
-``GoalServer`` keeps at most one goal; a new one replaces it. ``GoalClient`` sends one goal at a time
-and forgets about answers to earlier ones.
+``GoalServer`` keeps at most one goal; a new one replaces it. ``GoalClient`` sends one goal at a
+time and forgets about answers to earlier ones.
 """
 
 from collections.abc import Callable
@@ -20,8 +20,14 @@ class GoalServer:
     """
 
     def __init__(
-        self, node: Node, action: Any, name: str, *, check: Callable[[Any], None],
-        start: Callable[[Any], None], cancel: Callable[[], None],
+        self,
+        node: Node,
+        action: Any,
+        name: str,
+        *,
+        check: Callable[[Any], None],
+        start: Callable[[Any], None],
+        cancel: Callable[[], None],
         preempted: Callable[[], Any],
     ) -> None:
         self._node = node
@@ -30,8 +36,13 @@ class GoalServer:
         self._preempted = preempted
         self._handle: Any = None
         self._server = ActionServer(
-            node, action, name, execute_callback=self._execute, goal_callback=self._on_goal,
-            handle_accepted_callback=self._on_accepted, cancel_callback=self._on_cancel,
+            node,
+            action,
+            name,
+            execute_callback=self._execute,
+            goal_callback=self._on_goal,
+            handle_accepted_callback=self._on_accepted,
+            cancel_callback=self._on_cancel,
             result_timeout=30,
         )
 

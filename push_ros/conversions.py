@@ -84,8 +84,10 @@ def trajectory_to_ros(trajectory: Trajectory) -> TrajectoryMessage:
 
 def trajectory_from_ros(message: TrajectoryMessage) -> Trajectory:
     """Message to a trajectory; raises InvalidMessage when it is none."""
-    columns = [np.asarray(getattr(message, n), dtype=np.float64)
-               for n in ("time", "x", "y", "theta", "v", "omega")]
+    columns = [
+        np.asarray(getattr(message, n), dtype=np.float64)
+        for n in ("time", "x", "y", "theta", "v", "omega")
+    ]
     if len({len(c) for c in columns}) != 1:
         raise InvalidMessage("a trajectory's arrays must have the same length")
     try:
@@ -146,8 +148,10 @@ def plan_to_ros(plan: Any, robot: str, item: str, seconds: float) -> PlanMessage
     message.clearance = float(plan.clearance)
     message.segments = [segment_to_ros(s) for s in plan.segments]
     message.statistics = StatisticsMessage(
-        **{k: type(v)(v) if isinstance(v, int) else float(v)
-           for k, v in vars(plan.statistics).items()}
+        **{
+            k: type(v)(v) if isinstance(v, int) else float(v)
+            for k, v in vars(plan.statistics).items()
+        }
     )
     return message
 
@@ -161,7 +165,8 @@ def segment_to_ros(segment: Any) -> SegmentMessage:
         robot_start=pose_to_ros(segment.curve.start),
         robot_end=pose_to_ros(segment.curve.end),
         robot_standoff=pose_to_ros(segment.standoff),
-        k_start=float(segment.curve.k_start), k_end=float(segment.curve.k_end),
+        k_start=float(segment.curve.k_start),
+        k_end=float(segment.curve.k_end),
         length=float(segment.curve.length),
         curvature_min=float(segment.side.nominal.minimum),
         curvature_max=float(segment.side.nominal.maximum),

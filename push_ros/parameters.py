@@ -20,8 +20,12 @@ T = TypeVar("T")
 
 
 def declare_settings(
-    node: Node, cls: type[T], values: Mapping[str, Any] | None = None, prefix: str = "",
-    where: str = "parameters", apply: Callable[[T], None] | None = None,
+    node: Node,
+    cls: type[T],
+    values: Mapping[str, Any] | None = None,
+    prefix: str = "",
+    where: str = "parameters",
+    apply: Callable[[T], None] | None = None,
 ) -> T:
     """Declare every field of a settings class and return the settings.
 
@@ -33,8 +37,7 @@ def declare_settings(
         SettingsError to refuse. Without it the parameters are read-only.
     """
     defaults = from_mapping(cls, values, where)
-    names = {f.name: f"{prefix}.{f.name}" if prefix else f.name
-             for f in dataclasses.fields(cls)}  # type: ignore[arg-type]
+    names = {f.name: f"{prefix}.{f.name}" if prefix else f.name for f in dataclasses.fields(cls)}  # type: ignore[arg-type]
     for field in dataclasses.fields(cls):  # type: ignore[arg-type]
         value = getattr(defaults, field.name)
         if isinstance(value, tuple):

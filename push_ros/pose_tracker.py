@@ -1,8 +1,8 @@
 """From a stream of tracked poses to poses that may be acted on. No ROS here.
 
-Policy on stamps: zero is refused; one that is not newer than the last is refused, unless it lies back
-by more than ``reset_gap``, which counts as a reset of the clock; a gap forward beyond ``timeout`` counts
-as an interruption of the stream, after which a body's next pose is taken as it is.
+Policy on stamps: zero is refused; one that is not newer than the last is refused, unless it lies
+back by more than ``reset_gap``, which counts as a reset of the clock; a gap forward beyond
+``timeout`` counts as an interruption of the stream.
 """
 
 from dataclasses import dataclass
@@ -65,7 +65,7 @@ class PoseTracker:
         self._bodies: dict[str, _Body] = {}
 
     def begin(self, stamp: float) -> Stamp:
-        """Judge the stamp [s] of a frame; only poses of accepted frames may be given to ``accept``."""
+        """Judge the stamp [s] of a frame; ``accept`` is for the poses of accepted frames only."""
         if not np.isfinite(stamp) or stamp <= 0.0:
             self.refused += 1
             return Stamp.REFUSED

@@ -1,4 +1,4 @@
-"""Scenario files: environment, robots, objects, goal and settings, by path or by name. No ROS here."""
+"""Scenario files: environment, robots, objects, goal, settings; by path or name. No ROS here."""
 
 import importlib.util
 import math
@@ -52,8 +52,10 @@ class Scenario:
 
     def settings(self, node: str, **changes: Any) -> "Scenario":
         """The scenario with some settings of a node replaced; a key may be dotted with ``__``."""
-        values = {k: (dict(v) if isinstance(v, Mapping) else v)
-                  for k, v in self.parameters.get(node, {}).items()}
+        values = {
+            k: (dict(v) if isinstance(v, Mapping) else v)
+            for k, v in self.parameters.get(node, {}).items()
+        }
         for key, value in changes.items():
             *path, last = key.split("__")
             inner = values
@@ -137,11 +139,13 @@ def scenario_from_mapping(
     for key in ("environment", "robots"):
         if key not in values:
             raise SettingsError(f"{where}: missing key '{key}'")
-    environment = _load(EnvironmentSpec, "environments", values["environment"],
-                        f"{where}.environment", folder)
+    environment = _load(
+        EnvironmentSpec, "environments", values["environment"], f"{where}.environment", folder
+    )
     robots = _bodies(RobotSpec, "robots", values["robots"], f"{where}.robots", folder)
-    objects = _bodies(ObjectSpec, "objects", values.get("objects") or {}, f"{where}.objects",
-                      folder)
+    objects = _bodies(
+        ObjectSpec, "objects", values.get("objects") or {}, f"{where}.objects", folder
+    )
     if not robots:
         raise SettingsError(f"{where}.robots: at least one robot is needed")
     twice = set(robots) & set(objects)
@@ -154,7 +158,10 @@ def scenario_from_mapping(
     ):
         raise SettingsError(f"{where}.parameters: expected node names with mappings")
     return Scenario(
-        name, environment, robots, objects,
+        name,
+        environment,
+        robots,
+        objects,
         None if goal is None else _pose(goal, f"{where}.goal"),
         {str(k): dict(v) for k, v in parameters.items()},
         yaml.safe_dump(dict(values), sort_keys=False),
@@ -192,14 +199,16 @@ def _bodies(
         elif overrides:
             spec = {**spec, **overrides}
         result[str(name)] = (
-            _load(cls, kind, spec, here, folder), _pose(entry["start"], f"{here}.start")
+            _load(cls, kind, spec, here, folder),
+            _pose(entry["start"], f"{here}.start"),
         )
     return result
 
 
 def _pose(value: Any, where: str) -> Array:
     if (
-        not isinstance(value, (list, tuple)) or len(value) != 3
+        not isinstance(value, (list, tuple))
+        or len(value) != 3
         or not all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in value)
         or not all(math.isfinite(v) for v in value)
     ):

@@ -1,8 +1,8 @@
 """The finite state machine of section 2.5. Events in, commands out; no ROS, no clock, no geometry.
 
-States S1-S6 are those of Fig. 2.24. Beyond the thesis: a push that goes wrong is followed by a retreat
-and a new plan from where the object is, a plan is dropped when the object was moved by somebody
-else, and every job ends with a code.
+States S1-S6 are those of Fig. 2.24. Beyond the thesis: a push that goes wrong is followed by a
+retreat and a new plan from where the object is, a plan is dropped when the object was moved by
+somebody else, and every job ends with a code.
 """
 
 from collections.abc import Callable
@@ -49,7 +49,9 @@ class SupervisorSettings:
     """Tolerances, patience and speeds of a job."""
 
     auto_execute: bool = True
-    position_tolerance: float = bounded(0.012, low=1e-3, high=1.0, doc="[m] of the object at the goal")
+    position_tolerance: float = bounded(
+        0.012, low=1e-3, high=1.0, doc="[m] of the object at the goal"
+    )
     orientation_tolerance: float = bounded(0.06, low=1e-3, high=3.2, doc="[rad] at the goal")
     displacement: float = bounded(
         0.02, low=1e-3, high=1.0, doc="[m] off its planned start at which a plan is dropped"
@@ -60,7 +62,9 @@ class SupervisorSettings:
     max_losses: int = bounded(
         40, low=0, high=10000, doc="times in a row that the controller may be gone"
     )
-    max_preemptive: int = bounded(8, low=0, high=100, doc="pre-emptive pushes offered to the planner")
+    max_preemptive: int = bounded(
+        8, low=0, high=100, doc="pre-emptive pushes offered to the planner"
+    )
     approach_speed: float = bounded(0.04, low=1e-3, high=2.0, doc="[m/s] to contact and back")
     acceleration: float = bounded(0.1, low=1e-3, high=10.0, doc="[m/s^2] of those motions")
     detach_distance: float = bounded(0.06, low=5e-3, high=2.0, doc="[m] backed off after a push")
@@ -150,9 +154,7 @@ class Machine:
             Event.PATH_FAILED: (frozenset({State.POSITIONING}), self._on_path_failed),
             Event.MOTION_DONE: (_MOVING, self._on_motion_done),
             Event.MOTION_FAILED: (_MOVING, self._on_motion_failed),
-            Event.DISPLACED: (
-                frozenset({State.POSITIONING, State.APPROACH}), self._on_displaced
-            ),
+            Event.DISPLACED: (frozenset({State.POSITIONING, State.APPROACH}), self._on_displaced),
             Event.CLOCK_RESET: (frozenset(State), self._on_clock_reset),
         }
 
@@ -288,7 +290,10 @@ class Machine:
             self._push()
         elif self.state is State.PUSHING:
             following = self.index + 1
-            if following < len(self.segments) and self.segments[following].side == self.segment.side:
+            if (
+                following < len(self.segments)
+                and self.segments[following].side == self.segment.side
+            ):
                 self.index = following
                 self._push()
             else:

@@ -66,7 +66,10 @@ class SupervisorNode(Node):
             self, SupervisorSettings, values, where="supervisor", apply=self._apply
         )
         self._planner_settings = declare_settings(
-            self, PlannerSettings, self._scenario.parameters.get("planner", {}), "planner",
+            self,
+            PlannerSettings,
+            self._scenario.parameters.get("planner", {}),
+            "planner",
             "planner",
         )
         self._poses = PoseTracker(
@@ -102,7 +105,11 @@ class SupervisorNode(Node):
         self._follow_client = GoalClient(self, FollowTrajectory, f"/{self.robot}/follow_trajectory")
         self._path_client = self.create_client(PlanRobotPath, "/plan_robot_path")
         self._job = GoalServer(
-            self, MoveObject, "/move_object", check=lambda request: None, start=self._on_job,
+            self,
+            MoveObject,
+            "/move_object",
+            check=lambda request: None,
+            start=self._on_job,
             cancel=self._cancel,
             preempted=lambda: MoveObject.Result(
                 error_code=MoveObject.Result.PREEMPTED, error_msg="a new goal replaces this one"
@@ -111,7 +118,10 @@ class SupervisorNode(Node):
         self.create_service(Trigger, "/supervisor/execute", self._on_execute)
         self.create_service(Trigger, "/supervisor/cancel", self._on_cancel)
         self.create_subscription(
-            PoseStamped, "/goal_pose", self._on_goal_pose, COMMAND,
+            PoseStamped,
+            "/goal_pose",
+            self._on_goal_pose,
+            COMMAND,
             event_callbacks=events("/goal_pose"),
         )
         self.create_subscription(
@@ -303,8 +313,10 @@ class SupervisorNode(Node):
         if now - self._lost_since > self.settings.node_timeout:
             self._waiting = self._lost_since = None
             poses = robot is None or item is None
-            self._end_waiting("no poses of robot and object" if poses else "a node does not answer",
-                              JobError.POSES_STALE if poses else JobError.NODE_LOST)
+            self._end_waiting(
+                "no poses of robot and object" if poses else "a node does not answer",
+                JobError.POSES_STALE if poses else JobError.NODE_LOST,
+            )
 
     def _end_waiting(self, message: str, code: JobError) -> None:
         self._fire(Event.CANCEL)
@@ -323,9 +335,7 @@ class SupervisorNode(Node):
             self._follow_client.forget()
             self._fire(Event.MOTION_FAILED, message="the controller is gone", lost=True)
 
-    def _send(
-        self, command: Command, arguments: dict[str, Any], robot: Array, item: Array
-    ) -> None:
+    def _send(self, command: Command, arguments: dict[str, Any], robot: Array, item: Array) -> None:
         if command is Command.PLAN:
             offer = arguments["start"]
             start = item if offer is None else planar_pose(offer.object_end)
@@ -364,20 +374,30 @@ class SupervisorNode(Node):
     def _request_plan(self, start: Array, goal: Array) -> None:
         now = self._poses.stamp
         request = PlanPush.Goal(
-            object=self.object, robot=self.robot, start=pose_stamped_to_ros(start, now),
+            object=self.object,
+            robot=self.robot,
+            start=pose_stamped_to_ros(start, now),
             goal=pose_stamped_to_ros(goal, now),
         )
 
         def done(result: Any) -> None:
             if result is None:
-                self._fire(Event.PLAN_FAILED, code=JobError.PLANNING_FAILED,
-                           message="the planner rejected the request", retry=False)
+                self._fire(
+                    Event.PLAN_FAILED,
+                    code=JobError.PLANNING_FAILED,
+                    message="the planner rejected the request",
+                    retry=False,
+                )
             elif result.error_code == PlanPush.Result.NONE:
                 self._fire(Event.PLANNED, segments=list(result.plan.segments))
             else:
                 code = _PLAN_ERRORS.get(result.error_code, JobError.PLANNING_FAILED)
-                self._fire(Event.PLAN_FAILED, code=code, message=result.error_msg,
-                           retry=result.error_code in _RETRY_CODES)
+                self._fire(
+                    Event.PLAN_FAILED,
+                    code=code,
+                    message=result.error_msg,
+                    retry=result.error_code in _RETRY_CODES,
+                )
 
         self._plan_client.send(request, done)
 
@@ -398,7 +418,8 @@ class SupervisorNode(Node):
         standoff = se2.compose(contact, np.array([-self._planner_settings.standoff, 0.0, 0.0]))
         reach = self._object_radius + self._robot_spec.footprint_radius
         request = PlanRobotPath.Request(
-            start=pose_to_ros(robot), goal=pose_to_ros(standoff),
+            start=pose_to_ros(robot),
+            goal=pose_to_ros(standoff),
             obstacles=circles_to_ros(np.array([[item[0], item[1], reach]])),
         )
         self._path_token += 1
@@ -418,7 +439,8 @@ class SupervisorNode(Node):
 
     def _follow(self, trajectory: Any, circles: Array | None) -> None:
         goal = FollowTrajectory.Goal(
-            mode=FollowTrajectory.Goal.MOVE, trajectory=trajectory,
+            mode=FollowTrajectory.Goal.MOVE,
+            trajectory=trajectory,
             obstacles=[] if circles is None else circles_to_ros(self._near(circles, trajectory)),
             heartbeat_timeout=self.settings.heartbeat_timeout,
         )
@@ -426,8 +448,11 @@ class SupervisorNode(Node):
 
     def _follow_push(self, segment: Any) -> None:
         goal = FollowTrajectory.Goal(
-            mode=FollowTrajectory.Goal.PUSH, object=self.object, trajectory=segment.trajectory,
-            contact=pose_to_ros(self._grasp(segment)), curvature_min=segment.curvature_min,
+            mode=FollowTrajectory.Goal.PUSH,
+            object=self.object,
+            trajectory=segment.trajectory,
+            contact=pose_to_ros(self._grasp(segment)),
+            curvature_min=segment.curvature_min,
             curvature_max=segment.curvature_max,
             obstacles=circles_to_ros(self._near(self._obstacles, segment.trajectory)),
             heartbeat_timeout=self.settings.heartbeat_timeout,
@@ -484,8 +509,12 @@ class SupervisorNode(Node):
         way, turn = self._errors(self.machine.goal)
         self._job.finish(
             MoveObject.Result(
-                error_code=int(code), error_msg=message, position_error=way,
-                orientation_error=turn, pushes=self.pushes, replans=self.machine.replans,
+                error_code=int(code),
+                error_msg=message,
+                position_error=way,
+                orientation_error=turn,
+                pushes=self.pushes,
+                replans=self.machine.replans,
             ),
             success=code is JobError.NONE,
         )
@@ -499,16 +528,24 @@ class SupervisorNode(Node):
         way, _ = self._errors(self.machine.goal)
         m = self.machine
         return MoveObject.Feedback(
-            state=int(m.state), state_name=m.state.name, push_index=m.index,
-            push_count=len(m.segments), distance_to_goal=way,
+            state=int(m.state),
+            state_name=m.state.name,
+            push_index=m.index,
+            push_count=len(m.segments),
+            distance_to_goal=way,
         )
 
     def _publish_state(self, reason: str = "") -> None:
         m = self.machine
         message = SupervisorState(
-            state=int(m.state), state_name=m.state.name, reason=reason or m.reason,
-            error_code=int(m.error), plan_ready=m.plan_ready, push_index=m.index,
-            push_count=len(m.segments), replans=m.replans,
+            state=int(m.state),
+            state_name=m.state.name,
+            reason=reason or m.reason,
+            error_code=int(m.error),
+            plan_ready=m.plan_ready,
+            push_index=m.index,
+            push_count=len(m.segments),
+            replans=m.replans,
         )
         message.header.frame_id = "map"
         message.header.stamp = pose_stamped_to_ros(np.zeros(3), self._poses.stamp).header.stamp
@@ -521,9 +558,11 @@ class SupervisorNode(Node):
     def _diagnose(self) -> dict[str, Any]:
         m = self.machine
         return {
-            "state": m.state.name, "reason": m.reason, "error code": int(m.error),
-            "replans": m.replans, "poses refused": self._poses.refused,
+            "state": m.state.name,
+            "reason": m.reason,
+            "error code": int(m.error),
+            "replans": m.replans,
+            "poses refused": self._poses.refused,
             "pose jumps": self._poses.jumps,
             "warning": "no poses" if self._poses.pose(self.object) is None else "",
         }
-

@@ -1,1 +1,1 @@
-"""The world that stands in for real robots and motion capture: PyBullet, pose stream, bridge node."""
+"""The world that stands in for robots and motion capture: PyBullet, pose stream, bridge node."""

@@ -15,7 +15,8 @@ def body_markers(scenario: Scenario, poses: dict[str, Array], seconds: float) ->
     for number, (name, pose) in enumerate(poses.items()):
         is_robot = name in scenario.robots
         outline = (
-            scenario.robots[name][0].outline if is_robot
+            scenario.robots[name][0].outline
+            if is_robot
             else scenario.objects[name][0].geometry.outline
         )
         marker = Marker(ns="bodies", id=number, type=Marker.LINE_STRIP, action=Marker.ADD)

@@ -10,7 +10,6 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock as ClockMessage
 from std_srvs.srv import SetBool
-from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
 from push_model.arrays import Array
@@ -18,7 +17,13 @@ from push_model.settings import SettingsError
 from push_msgs.msg import Contact as ContactMessage
 from push_msgs.msg import Contacts, NamedPose, NamedPoses
 from push_msgs.srv import LoadScenario, Reset
-from push_ros.conversions import grid_to_ros, pose_to_ros, time_from_ros, time_to_ros, transform_to_ros
+from push_ros.conversions import (
+    grid_to_ros,
+    pose_to_ros,
+    time_from_ros,
+    time_to_ros,
+    transform_to_ros,
+)
 from push_ros.diagnostics import Diagnostics
 from push_ros.parameters import declare_settings
 from push_ros.qos import CLOCK, COMMAND, LATCHED, STATUS, STREAM
@@ -34,6 +39,7 @@ from sim_bridge.settings import (
     steps_per_tick,
 )
 from sim_bridge.world import Contact, World
+from tf2_msgs.msg import TFMessage
 
 
 class BridgeNode(Node):
@@ -100,7 +106,10 @@ class BridgeNode(Node):
             topic = f"/{robot}/cmd_vel"
             self._inputs.append(
                 self.create_subscription(
-                    TwistStamped, topic, lambda m, r=robot: self._on_command(r, m), COMMAND,
+                    TwistStamped,
+                    topic,
+                    lambda m, r=robot: self._on_command(r, m),
+                    COMMAND,
                     event_callbacks=self._diagnostics.subscription_events(topic),
                 )
             )
@@ -113,7 +122,7 @@ class BridgeNode(Node):
         self._last_wall: dict[str, float] = {}
         self._pace.restart()
         self._lockstep.expect(0, (), time.monotonic())
-        self._driving: dict[str, bool] = {r: False for r in self._scenario.robots}
+        self._driving: dict[str, bool] = dict.fromkeys(self._scenario.robots, False)
 
     @property
     def time(self) -> float:
@@ -137,8 +146,7 @@ class BridgeNode(Node):
         if not self.running:
             # A lockstep run waits for its controllers; a live one shows the scene at once.
             if self._autostart and (
-                not self.settings.lockstep
-                or len(self.commanded()) == len(self._scenario.robots)
+                not self.settings.lockstep or len(self.commanded()) == len(self._scenario.robots)
             ):
                 self.start()
             return
@@ -252,10 +260,12 @@ class BridgeNode(Node):
         message.header.stamp = stamp
         message.contacts = [
             ContactMessage(
-                body_a=c.body_a, body_b=c.body_b, position=Point(x=c.position[0], y=c.position[1],
-                                                                 z=c.position[2]),
+                body_a=c.body_a,
+                body_b=c.body_b,
+                position=Point(x=c.position[0], y=c.position[1], z=c.position[2]),
                 normal=Vector3(x=c.normal[0], y=c.normal[1], z=c.normal[2]),
-                force=Vector3(x=c.force[0], y=c.force[1], z=c.force[2]), duty=c.duty,
+                force=Vector3(x=c.force[0], y=c.force[1], z=c.force[2]),
+                duty=c.duty,
             )
             for c in contacts
         ]
@@ -287,8 +297,10 @@ class BridgeNode(Node):
 
     def _state(self) -> dict[str, Any]:
         return {
-            "sim time": f"{self.time:.2f}", "scenario": self._scenario.name,
-            "lockstep timeouts": self.lockstep_timeouts, "stalls": self._pace.stalls,
+            "sim time": f"{self.time:.2f}",
+            "scenario": self._scenario.name,
+            "lockstep timeouts": self.lockstep_timeouts,
+            "stalls": self._pace.stalls,
             "paused": self._paused,
         }
 

@@ -41,9 +41,7 @@ class ObjectBody:
         hulls = _hulls(client, shape, height)
         n, radius = spec.feet, uniform_pressure_radius(shape)
         angle = (np.arange(n) + 0.5) * 2.0 * math.pi / n
-        foot = pb.createCollisionShape(
-            pb.GEOM_SPHERE, radius=_FOOT_RADIUS, physicsClientId=client
-        )
+        foot = pb.createCollisionShape(pb.GEOM_SPHERE, radius=_FOOT_RADIUS, physicsClientId=client)
         base = hulls[0] if len(hulls) == 1 else -1
         rest = [] if len(hulls) == 1 else hulls
         links = n + len(rest)
@@ -52,7 +50,9 @@ class ObjectBody:
         positions = [[radius * math.cos(a), radius * math.sin(a), z] for a in angle]
         self._rest_height = height / 2.0 + _CLEARANCE
         self.body = pb.createMultiBody(
-            spec.mass - links * link_mass, base, basePosition=[0.0, 0.0, self._rest_height],
+            spec.mass - links * link_mass,
+            base,
+            basePosition=[0.0, 0.0, self._rest_height],
             linkMasses=[link_mass] * links,
             linkCollisionShapeIndices=[foot] * n + rest,
             linkVisualShapeIndices=[-1] * links,
@@ -60,8 +60,10 @@ class ObjectBody:
             linkOrientations=[[0, 0, 0, 1]] * links,
             linkInertialFramePositions=[[0, 0, 0]] * links,
             linkInertialFrameOrientations=[[0, 0, 0, 1]] * links,
-            linkParentIndices=[0] * links, linkJointTypes=[pb.JOINT_FIXED] * links,
-            linkJointAxis=[[0, 0, 1]] * links, physicsClientId=client,
+            linkParentIndices=[0] * links,
+            linkJointTypes=[pb.JOINT_FIXED] * links,
+            linkJointAxis=[[0, 0, 1]] * links,
+            physicsClientId=client,
         )
         self.side_links = [-1] if len(hulls) == 1 else list(range(n, links))
         self.foot_links = list(range(n))
@@ -72,12 +74,21 @@ class ObjectBody:
             # Friction and damping in one call leave the friction of a link unset.
             pb.changeDynamics(self.body, link, lateralFriction=friction, physicsClientId=client)
             pb.changeDynamics(
-                self.body, link, linearDamping=0.0, angularDamping=0.0, restitution=0.0,
-                rollingFriction=0.0, spinningFriction=0.0, physicsClientId=client,
+                self.body,
+                link,
+                linearDamping=0.0,
+                angularDamping=0.0,
+                restitution=0.0,
+                rollingFriction=0.0,
+                spinningFriction=0.0,
+                physicsClientId=client,
             )
             if is_foot:
                 pb.changeDynamics(
-                    self.body, link, contactStiffness=feet.stiffness, contactDamping=feet.damping,
+                    self.body,
+                    link,
+                    contactStiffness=feet.stiffness,
+                    contactDamping=feet.damping,
                     physicsClientId=client,
                 )
                 pb.setCollisionFilterGroupMask(
@@ -86,9 +97,7 @@ class ObjectBody:
             applied = pb.getDynamicsInfo(self.body, link, physicsClientId=client)[1]
             if abs(applied - friction) > 1e-9:
                 raise RuntimeError(f"friction {friction} was not applied to link {link}: {applied}")
-        pb.changeDynamics(
-            self.body, -1, localInertiaDiagonal=inertia, physicsClientId=client
-        )
+        pb.changeDynamics(self.body, -1, localInertiaDiagonal=inertia, physicsClientId=client)
         self.place(start)
 
     def _base_inertia(
@@ -103,8 +112,10 @@ class ObjectBody:
     def place(self, pose: Array) -> None:
         """Put the centre of mass at a pose ``(3,)``, at rest."""
         pb.resetBasePositionAndOrientation(
-            self.body, [float(pose[0]), float(pose[1]), self._rest_height],
-            pb.getQuaternionFromEuler([0.0, 0.0, float(pose[2])]), physicsClientId=self._client,
+            self.body,
+            [float(pose[0]), float(pose[1]), self._rest_height],
+            pb.getQuaternionFromEuler([0.0, 0.0, float(pose[2])]),
+            physicsClientId=self._client,
         )
         pb.resetBaseVelocity(self.body, [0, 0, 0], [0, 0, 0], physicsClientId=self._client)
 

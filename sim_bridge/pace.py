@@ -13,7 +13,7 @@ class Lockstep:
         self._since = 0.0
 
     def expect(self, frame: int, robots: Iterable[str], now: float) -> None:
-        """A frame (tick number) was published at monotonic time now [s]; these robots must answer."""
+        """A frame (tick number) was published at monotonic time now [s]; robots must answer it."""
         self._frame, self._waiting, self._since = frame, set(robots), now
 
     def answer(self, frame: int, robot: str) -> None:

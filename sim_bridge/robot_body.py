@@ -18,8 +18,8 @@ _CASTER_CLEARANCE = 2e-4  # [m] above the floor at rest; the robot leans on one 
 def robot_urdf(spec: RobotSpec) -> str:
     """URDF text: body with bumper, two spherical wheels, two frictionless casters.
 
-    Wheels are spheres because PyBullet's cylinders are polygons by default and cost 4 % in distance;
-    they touch nothing but the floor.
+    Wheels are spheres because PyBullet's cylinders are polygons by default and cost 4 % in
+    distance; they touch nothing but the floor.
     """
     body_mass = spec.mass - 2.0 * spec.wheel_mass
     h, r, wr = spec.body_height, spec.body_radius, spec.wheel_radius
@@ -33,11 +33,13 @@ def robot_urdf(spec: RobotSpec) -> str:
         _collision(f'<cylinder radius="{r}" length="{h - 0.005}"/>', 0.0, body_z)
         + _collision(
             f'<box size="{thickness} {b.width} {b.height}"/>',
-            b.distance - thickness / 2.0, bumper_z,
+            b.distance - thickness / 2.0,
+            bumper_z,
         )
         + _collision(  # the arm that carries the bumper
             f'<box size="{b.distance - thickness} {min(b.width, 2 * r) * 0.5} {b.height * 0.5}"/>',
-            (b.distance - thickness) / 2.0, bumper_z,
+            (b.distance - thickness) / 2.0,
+            bumper_z,
         )
     )
     text = '<robot name="robot">' + _link("body", body_mass, ixx, ixx, izz, collisions, -0.005)
@@ -89,17 +91,24 @@ class RobotBody:
             path = Path(folder) / "robot.urdf"
             path.write_text(robot_urdf(spec))
             self.body = pb.loadURDF(
-                str(path), [0.0, 0.0, spec.wheel_radius], physicsClientId=client,
+                str(path),
+                [0.0, 0.0, spec.wheel_radius],
+                physicsClientId=client,
                 flags=pb.URDF_USE_IMPLICIT_CYLINDER,
             )
         for link in range(-1, 4):
             friction = 1.0 if link == BODY else spec.wheel_friction if link in WHEELS else 0.0
+            pb.changeDynamics(self.body, link, lateralFriction=friction, physicsClientId=client)
             pb.changeDynamics(
-                self.body, link, lateralFriction=friction, physicsClientId=client
-            )
-            pb.changeDynamics(
-                self.body, link, rollingFriction=0.0, spinningFriction=0.0, restitution=0.0,
-                linearDamping=0.0, angularDamping=0.0, jointDamping=0.0, physicsClientId=client,
+                self.body,
+                link,
+                rollingFriction=0.0,
+                spinningFriction=0.0,
+                restitution=0.0,
+                linearDamping=0.0,
+                angularDamping=0.0,
+                jointDamping=0.0,
+                physicsClientId=client,
             )
             if link != BODY:
                 pb.setCollisionFilterGroupMask(
@@ -113,7 +122,9 @@ class RobotBody:
         height = self.spec.wheel_radius - 0.005 + 1e-4
         quaternion = pb.getQuaternionFromEuler([0.0, 0.0, float(pose[2])])
         pb.resetBasePositionAndOrientation(
-            self.body, [float(pose[0]), float(pose[1]), height], quaternion,
+            self.body,
+            [float(pose[0]), float(pose[1]), height],
+            quaternion,
             physicsClientId=self._client,
         )
         pb.resetBaseVelocity(self.body, [0, 0, 0], [0, 0, 0], physicsClientId=self._client)
@@ -125,7 +136,10 @@ class RobotBody:
         """Set the wheel motors to a twist, scaled down to what the wheels can do."""
         v, omega = self.drive.saturate(v, omega)
         pb.setJointMotorControlArray(
-            self.body, WHEELS, pb.VELOCITY_CONTROL,
+            self.body,
+            WHEELS,
+            pb.VELOCITY_CONTROL,
             targetVelocities=self.drive.wheel_speeds(v, omega),
-            forces=[self.spec.wheel_torque] * 2, physicsClientId=self._client,
+            forces=[self.spec.wheel_torque] * 2,
+            physicsClientId=self._client,
         )

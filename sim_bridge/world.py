@@ -54,7 +54,8 @@ class World:
         pb.setPhysicsEngineParameter(
             fixedTimeStep=self.physics.time_step,
             numSolverIterations=self.physics.solver_iterations,
-            contactBreakingThreshold=0.001, deterministicOverlappingPairs=1,
+            contactBreakingThreshold=0.001,
+            deterministicOverlappingPairs=1,
             physicsClientId=self._client,  # enableConeFriction=1 would switch the cone off
         )
         self._build_environment(environment)
@@ -67,6 +68,7 @@ class World:
         for name, (item, start) in objects.items():
             self.objects[name] = ObjectBody(self._client, item, feet, start)
             self._names[self.objects[name].body] = name
+        self._bodies: dict[str, RobotBody | ObjectBody] = {**self.robots, **self.objects}
         self._clear_contacts()
 
     def __enter__(self) -> "World":
@@ -83,12 +85,15 @@ class World:
 
     def _static(self, shape: int, x: float, y: float, z: float, yaw: float, mu: float) -> int:
         body: int = pb.createMultiBody(
-            0.0, shape, basePosition=[x, y, z],
+            0.0,
+            shape,
+            basePosition=[x, y, z],
             baseOrientation=pb.getQuaternionFromEuler([0.0, 0.0, yaw]),
             physicsClientId=self._client,
         )
-        pb.changeDynamics(body, -1, lateralFriction=mu, restitution=0.0,
-                          physicsClientId=self._client)
+        pb.changeDynamics(
+            body, -1, lateralFriction=mu, restitution=0.0, physicsClientId=self._client
+        )
         return body
 
     def _build_environment(self, environment: EnvironmentSpec) -> None:
@@ -109,7 +114,8 @@ class World:
         ] + [(*b.centre, *b.size, b.yaw) for b in environment.boxes]
         for i, (x, y, length, width, yaw) in enumerate(walls):
             shape = pb.createCollisionShape(
-                pb.GEOM_BOX, halfExtents=[length / 2.0, width / 2.0, h / 2.0],
+                pb.GEOM_BOX,
+                halfExtents=[length / 2.0, width / 2.0, h / 2.0],
                 physicsClientId=self._client,
             )
             self._names[self._static(shape, x, y, h / 2.0, yaw, mu)] = f"wall{i}"
@@ -128,7 +134,7 @@ class World:
 
     def reset(self) -> None:
         """Put every body back to its start, at rest."""
-        for name, body in {**self.robots, **self.objects}.items():
+        for name, body in self._bodies.items():
             body.place(self._starts[name])
         self._clear_contacts()
 
@@ -169,7 +175,7 @@ class World:
         a, b, normal, load = point[1], point[2], point[7], point[9]
         if load <= 0.0 or b == self._floor:
             return
-        if b in self._names and a > b and self._names[b] in self.robots | self.objects:
+        if b in self._names and a > b and self._names[b] in self._bodies:
             return  # PyBullet lists a pair of tracked bodies twice, once from each side
         sums, steps = self._touching.setdefault((a, b), ([0.0] * 9, set()))
         t1, d1, t2, d2 = point[10], point[11], point[12], point[13]
@@ -188,8 +194,12 @@ class World:
             total = max(load, 1e-12)
             result.append(
                 Contact(
-                    self._names[a], self._names[b], values[3:6] / total, values[6:9] / total,
-                    values[:3] / self._steps, len(steps) / self._steps,
+                    self._names[a],
+                    self._names[b],
+                    values[3:6] / total,
+                    values[6:9] / total,
+                    values[:3] / self._steps,
+                    len(steps) / self._steps,
                 )
             )
         self._clear_contacts()
@@ -198,24 +208,24 @@ class World:
     def poses(self) -> dict[str, Array]:
         """Ground truth: every robot's and object's pose ``(3,)``."""
         result = {}
-        for name, body in {**self.robots, **self.objects}.items():
-            (x, y, _), q = pb.getBasePositionAndOrientation(
-                body.body, physicsClientId=self._client
-            )
-            yaw = math.atan2(2.0 * (q[3] * q[2] + q[0] * q[1]), 1.0 - 2.0 * (q[1]**2 + q[2]**2))
+        for name, body in self._bodies.items():
+            (x, y, _), q = pb.getBasePositionAndOrientation(body.body, physicsClientId=self._client)
+            yaw = math.atan2(2.0 * (q[3] * q[2] + q[0] * q[1]), 1.0 - 2.0 * (q[1] ** 2 + q[2] ** 2))
             result[name] = np.array([x, y, yaw])
         return result
 
     def velocity(self, name: str) -> Array:
         """Ground truth twist ``(3,)`` of a body's centre of mass."""
-        body = {**self.robots, **self.objects}[name].body
+        body = self._bodies[name].body
         linear, angular = pb.getBaseVelocity(body, physicsClientId=self._client)
         return np.array([linear[0], linear[1], angular[2]])
 
     def set_velocity(self, name: str, twist: Array) -> None:
         """Overwrite a body's planar velocity ``(3,)``; for experiments on the physics itself."""
-        body = {**self.robots, **self.objects}[name].body
+        body = self._bodies[name].body
         pb.resetBaseVelocity(
-            body, [float(twist[0]), float(twist[1]), 0.0], [0.0, 0.0, float(twist[2])],
+            body,
+            [float(twist[0]), float(twist[1]), 0.0],
+            [0.0, 0.0, float(twist[2])],
             physicsClientId=self._client,
         )

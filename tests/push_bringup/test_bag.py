@@ -37,8 +37,10 @@ def test_bag_opens_in_rosbags_and_mcap(tmp_path):
     with AnyReader([tmp_path / "bag"]) as reader:
         (connection,) = [c for c in reader.connections if c.topic == "/poses"]
         assert connection.msgtype == "push_msgs/msg/NamedPoses" and connection.msgcount == 100
-        values = [reader.deserialize(d, c.msgtype).poses[0].pose.position.x
-                  for c, _, d in reader.messages([connection])]
+        values = [
+            reader.deserialize(d, c.msgtype).poses[0].pose.position.x
+            for c, _, d in reader.messages([connection])
+        ]
         assert values == [0.5 * k for k in range(100)]
     with bag_file(tmp_path / "bag").open("rb") as file:
         reader = make_reader(file)

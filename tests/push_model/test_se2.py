@@ -34,5 +34,6 @@ def test_wrap_is_the_same_angle_in_range(angle):
 
 @given(st.floats(-3.1, 3.1))
 def test_quaternion_round_trip(theta):
-    assert math.isclose(se2.yaw_from_quaternion(*se2.quaternion_from_yaw(theta)), theta,
-                        abs_tol=1e-12)
+    assert math.isclose(
+        se2.yaw_from_quaternion(*se2.quaternion_from_yaw(theta)), theta, abs_tol=1e-12
+    )

@@ -50,14 +50,17 @@ def test_errors_name_place_value_and_expectation(values, words):
 
 junk = st.recursive(
     st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=5),
-    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner,
-                                                                max_size=3),
+    lambda inner: (
+        st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner, max_size=3)
+    ),
     max_leaves=8,
 )
 
 
-@given(st.sampled_from([RobotSpec, ObjectSpec, EnvironmentSpec]),
-       st.dictionaries(st.sampled_from(["size", "shape", "mass", "boxes", "bumper", "x"]), junk))
+@given(
+    st.sampled_from([RobotSpec, ObjectSpec, EnvironmentSpec]),
+    st.dictionaries(st.sampled_from(["size", "shape", "mass", "boxes", "bumper", "x"]), junk),
+)
 def test_junk_is_refused_with_a_settings_error_or_accepted(cls, values):
     try:
         from_mapping(cls, values)

@@ -49,10 +49,16 @@ def test_polygons_are_centred_counterclockwise_or_refused(vertices):
 
 @pytest.mark.parametrize(
     "bad",
-    [{}, {"polygon": {"vertices": [[0, 0], [1, 1]]}}, {"circle": {"radius": 1}},
-     {"rectangle": {"length": -1, "width": 1}}, {"flower": {"radius": 1, "amplitude": 2,
-                                                            "petals": 5}},
-     {"polygon": {"vertices": [[0, 0], [1, 1], [1, 0], [0, 1]]}}, "box", 3],
+    [
+        {},
+        {"polygon": {"vertices": [[0, 0], [1, 1]]}},
+        {"circle": {"radius": 1}},
+        {"rectangle": {"length": -1, "width": 1}},
+        {"flower": {"radius": 1, "amplitude": 2, "petals": 5}},
+        {"polygon": {"vertices": [[0, 0], [1, 1], [1, 0], [0, 1]]}},
+        "box",
+        3,
+    ],
 )
 def test_bad_shapes_are_refused(bad):
     with pytest.raises(SettingsError):

@@ -57,8 +57,10 @@ def test_limits_separate_wrenches_inside_and_outside_the_contact_cone(shape, mu)
         contact = contact_on_side(side, 0.07)
         limits = curvature_limits(contact, 0.05, mu, surface)
         grasp = line_contact_grasp(
-            contact.centre[0], contact.right - contact.centre[1],
-            contact.left - contact.centre[1], mu,
+            contact.centre[0],
+            contact.right - contact.centre[1],
+            contact.left - contact.centre[1],
+            mu,
         )
         c, s = math.cos(contact.heading), math.sin(contact.heading)
         points = surface.points @ np.array([[c, s], [-s, c]])

@@ -40,8 +40,11 @@ def test_backends_agree_with_a_dense_reference(name):
         from scipy.optimize import minimize
 
         other = minimize(
-            lambda z, H=H, f=f: 0.5 * z @ H @ z + f @ z, np.zeros(n),
-            jac=lambda z, H=H, f=f: H @ z + f, bounds=[(-1, 1)] * n, method="SLSQP",
+            lambda z, H=H, f=f: 0.5 * z @ H @ z + f @ z,
+            np.zeros(n),
+            jac=lambda z, H=H, f=f: H @ z + f,
+            bounds=[(-1, 1)] * n,
+            method="SLSQP",
             constraints={"type": "ineq", "fun": lambda z, G=G, b=b: b - G @ z},
             options={"ftol": 1e-14, "maxiter": 500},
         )
@@ -154,7 +157,9 @@ def test_nan_input_is_a_failure_that_leaves_no_trace(where):
         reference = Reference(reference.pose, reference.twist * np.inf)
     assert not mpc.solve(error, reference, LIMITS, NONE).solved
     after = mpc.solve(np.full(5, 0.01), straight(), LIMITS, NONE)
-    assert after.acceleration == clean.solve(np.full(5, 0.01), straight(), LIMITS, NONE).acceleration
+    assert (
+        after.acceleration == clean.solve(np.full(5, 0.01), straight(), LIMITS, NONE).acceleration
+    )
 
 
 def test_half_plane_of_2_60_needs_the_unit_normal():

@@ -37,8 +37,24 @@ def build(e0, nominal, ref, h=0.1, Q=None):
     H, f = np.zeros((n, n)), np.zeros(n)
     S, g, roll = np.zeros((p, 5, 2 * p)), np.zeros((p, 5)), np.zeros((p + 1, 5))
     Q = np.ones(5) if Q is None else Q
-    condense(e0, nominal, np.array([0.1, -0.2]), ref, h, Q, 3 * Q, np.array([0.3, 0.2]),
-             np.array([0.1, 0.4]), 1.0, 10.0, H, f, S, g, roll)
+    condense(
+        e0,
+        nominal,
+        np.array([0.1, -0.2]),
+        ref,
+        h,
+        Q,
+        3 * Q,
+        np.array([0.3, 0.2]),
+        np.array([0.1, 0.4]),
+        1.0,
+        10.0,
+        H,
+        f,
+        S,
+        g,
+        roll,
+    )
     return H, f, S, g, roll
 
 
@@ -60,15 +76,30 @@ def test_rollout_is_the_nonlinear_error_dynamics(seed):
         k = min(int(t / h), p - 1)
         w = t / h - k
         v, o = (1 - w) * vd[k] + w * vd[k + 1], (1 - w) * od[k] + w * od[k + 1]
-        return [v * math.cos(x[2]), v * math.sin(x[2]), o, x[6] * math.cos(x[5]),
-                x[6] * math.sin(x[5]), x[7], u[k, 0], u[k, 1]]
+        return [
+            v * math.cos(x[2]),
+            v * math.sin(x[2]),
+            o,
+            x[6] * math.cos(x[5]),
+            x[6] * math.sin(x[5]),
+            x[7],
+            u[k, 0],
+            u[k, 1],
+        ]
 
     for k in range(p):
-        state = solve_ivp(motion, (k * h, (k + 1) * h - 1e-12), state, rtol=1e-9, atol=1e-11).y[:, -1]
+        state = solve_ivp(motion, (k * h, (k + 1) * h - 1e-12), state, rtol=1e-9, atol=1e-11).y[
+            :, -1
+        ]
         d = state[3:5] - state[:2]
         c, s = math.cos(state[2]), math.sin(state[2])
-        expected = [c * d[0] + s * d[1], -s * d[0] + c * d[1], state[5] - state[2],
-                    state[6] - vd[k + 1], state[7] - od[k + 1]]
+        expected = [
+            c * d[0] + s * d[1],
+            -s * d[0] + c * d[1],
+            state[5] - state[2],
+            state[6] - vd[k + 1],
+            state[7] - od[k + 1],
+        ]
         assert roll[k + 1] == pytest.approx(expected, abs=2e-5)
 
 

@@ -132,8 +132,12 @@ def test_preemptive_pushes_are_free_sorted_and_stable(planner):
 def test_robot_path_goes_round_the_object(planner, robot):
     circle = np.array([[0.5, 0.0, 0.2]])
     path = plan_robot_path(
-        planner.scene.field, robot, planner.settings, np.array([0.2, 0.0, 0.0]),
-        np.array([0.8, 0.0, 0.0]), circle,
+        planner.scene.field,
+        robot,
+        planner.settings,
+        np.array([0.2, 0.0, 0.0]),
+        np.array([0.8, 0.0, 0.0]),
+        circle,
     )
     assert path.pose[-1] == pytest.approx([0.8, 0.0, 0.0], abs=1e-6)
     assert np.hypot(path.pose[:, 0] - 0.5, path.pose[:, 1]).min() >= 0.2
@@ -145,6 +149,10 @@ def test_no_robot_path_through_a_wall(robot):
     walled = EnvironmentSpec((3.0, 2.0), boxes=(BoxSpec((0.0, 0.0), (0.1, 2.0)),))
     with pytest.raises(NoRobotPath):
         plan_robot_path(
-            DistanceField(rasterise(walled)), robot, PlannerSettings(), np.array([-1.0, 0, 0]),
-            np.array([1.0, 0, 0]), np.zeros((0, 3)),
+            DistanceField(rasterise(walled)),
+            robot,
+            PlannerSettings(),
+            np.array([-1.0, 0, 0]),
+            np.array([1.0, 0, 0]),
+            np.zeros((0, 3)),
         )

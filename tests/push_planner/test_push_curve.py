@@ -16,8 +16,13 @@ starts = st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(-3, 3)).map(np.
 
 def finish(start, distance, bearing, turn):
     heading = start[2] + bearing
-    return np.array([start[0] + distance * math.cos(heading),
-                     start[1] + distance * math.sin(heading), start[2] + turn])
+    return np.array(
+        [
+            start[0] + distance * math.cos(heading),
+            start[1] + distance * math.sin(heading),
+            start[2] + turn,
+        ]
+    )
 
 
 @given(starts, st.floats(0.2, 1.5), angles, angles, st.floats(0.05, 2), st.floats(0.05, 2))
@@ -42,19 +47,19 @@ def test_found_curves_keep_both_limits_everywhere(start, distance, bearing, turn
     points, heading, kappa = curve.sample(2001)
     assert kappa.max() <= high * (1 + 2e-3) and kappa.min() >= low * (1 + 2e-3)
     assert curve.length == pytest.approx(np.hypot(*np.diff(points, axis=0).T).sum(), rel=1e-3)
-    measured = np.gradient(heading) / np.maximum(
-        np.hypot(*np.gradient(points, axis=0).T), 1e-12
-    )
+    measured = np.gradient(heading) / np.maximum(np.hypot(*np.gradient(points, axis=0).T), 1e-12)
     assert measured[1:-1] == pytest.approx(kappa[1:-1], rel=0.05, abs=0.1)
 
 
 def test_as_short_as_slsqp_finds_and_never_misses_what_it_finds():
     random = np.random.default_rng(4)
+    low, high = -4.0, 5.0
     missed = gaps = 0
     for _ in range(40):
         start = np.zeros(3)
-        end = finish(start, random.uniform(0.3, 1.5), random.uniform(-1, 1), random.uniform(-1.5, 1.5))
-        low, high = -4.0, 5.0
+        end = finish(
+            start, random.uniform(0.3, 1.5), random.uniform(-1, 1), random.uniform(-1.5, 1.5)
+        )
 
         def bend(k, end=end):
             return PushCurve(np.zeros(3), end, *np.maximum(k, 1e-3), 0.0).sample(101)
@@ -64,13 +69,20 @@ def test_as_short_as_slsqp_finds_and_never_misses_what_it_finds():
 
         distance = np.hypot(*end[:2])
         other = minimize(
-            length, [distance, distance], method="SLSQP", bounds=[(0.02, 20)] * 2,
-            constraints=[{"type": "ineq", "fun": lambda k, bend=bend: high - bend(k)[2]},
-                         {"type": "ineq", "fun": lambda k, bend=bend: bend(k)[2] - low}],
+            length,
+            [distance, distance],
+            method="SLSQP",
+            bounds=[(0.02, 20)] * 2,
+            constraints=[
+                {"type": "ineq", "fun": lambda k, bend=bend: high - bend(k)[2]},
+                {"type": "ineq", "fun": lambda k, bend=bend: bend(k)[2] - low},
+            ],
         )
         ours = shortest_push_curve(start, end, low, high)
-        if other.success and np.all(bend(other.x)[2] <= high - 0.02) and np.all(
-            bend(other.x)[2] >= low + 0.02
+        if (
+            other.success
+            and np.all(bend(other.x)[2] <= high - 0.02)
+            and np.all(bend(other.x)[2] >= low + 0.02)
         ):
             missed += ours is None
             gaps += ours is not None and ours.length > 1.01 * other.fun

@@ -17,8 +17,9 @@ numbers = st.floats(-100, 100)
 
 @given(numbers, numbers, st.floats(-3.14, 3.14))
 def test_pose_round_trip(x, y, theta):
-    assert planar_pose(c.pose_to_ros(np.array([x, y, theta]))) == pytest.approx([x, y, theta],
-                                                                                abs=1e-9)
+    assert planar_pose(c.pose_to_ros(np.array([x, y, theta]))) == pytest.approx(
+        [x, y, theta], abs=1e-9
+    )
 
 
 @given(st.integers(0, 10**7), st.integers(0, 999))

@@ -11,7 +11,8 @@ from push_model.occupancy import rasterise
 from push_ros.scenario import load_scenario, scenario_from_mapping, scenario_names
 
 GOOD = {
-    "environment": "env1", "robots": {"r": {"type": "epuck", "start": [0, 0, 0]}},
+    "environment": "env1",
+    "robots": {"r": {"type": "epuck", "start": [0, 0, 0]}},
     "objects": {"b": {"type": "box9", "start": [0.3, 0, 0]}},
 }
 
@@ -61,11 +62,16 @@ def test_overrides_within_a_scenario():
     assert scenario_from_mapping(values, "s", "s").objects["b"][0].mass == 0.08
 
 
-@given(st.dictionaries(
-    st.sampled_from(["environment", "robots", "objects", "goal", "parameters"]),
-    st.recursive(st.none() | st.integers() | st.text(max_size=4),
-                 lambda x: st.lists(x, max_size=3) | st.dictionaries(st.text(max_size=4), x,
-                                                                     max_size=3), max_leaves=5)))
+@given(
+    st.dictionaries(
+        st.sampled_from(["environment", "robots", "objects", "goal", "parameters"]),
+        st.recursive(
+            st.none() | st.integers() | st.text(max_size=4),
+            lambda x: st.lists(x, max_size=3) | st.dictionaries(st.text(max_size=4), x, max_size=3),
+            max_leaves=5,
+        ),
+    )
+)
 def test_junk_scenarios_are_refused_not_crashed_on(values):
     try:
         scenario_from_mapping({**GOOD, **values}, "s", "s.yaml")

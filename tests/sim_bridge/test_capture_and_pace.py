@@ -31,8 +31,9 @@ def test_latency_delays_publication_not_the_stamp():
 
 def test_dropouts_leave_bodies_out():
     capture = MotionCapture(MotionCaptureSettings(dropout=0.25), 1)
-    seen = [set(capture.observe(k, {"a": np.zeros(3), "b": np.zeros(3)}).poses)
-            for k in range(4000)]
+    seen = [
+        set(capture.observe(k, {"a": np.zeros(3), "b": np.zeros(3)}).poses) for k in range(4000)
+    ]
     assert np.mean(["a" in s for s in seen]) == pytest.approx(0.75, abs=0.03)
     assert {"a"} in seen and {"b"} in seen  # independent per body
 

@@ -55,8 +55,12 @@ def test_spinning_friction_is_that_of_uniform_pressure(box):
         first = w.velocity("b")[2]
         w.step(40)
         slowed = (first - w.velocity("b")[2]) / 0.04
-        expected = (box.floor_friction * 9.81 * uniform_pressure_radius(box.geometry)
-                    / box.geometry.inertia_per_mass)
+        expected = (
+            box.floor_friction
+            * 9.81
+            * uniform_pressure_radius(box.geometry)
+            / box.geometry.inertia_per_mass
+        )
         assert slowed == pytest.approx(expected, rel=0.05)
 
 

@@ -16,8 +16,10 @@ from push_ros.scenario import load_scenario
 
 SPECIAL = [0.0, -1.0, 1.0, 1e-300, 1e300, math.nan, math.inf, -math.inf, 0.3]
 INPUTS = {
-    "/poses": (NamedPoses, STREAM), "/goal_pose": (PoseStamped, COMMAND),
-    "/map": (OccupancyGrid, LATCHED), "/epuck1/heartbeat": (Header, STREAM),
+    "/poses": (NamedPoses, STREAM),
+    "/goal_pose": (PoseStamped, COMMAND),
+    "/map": (OccupancyGrid, LATCHED),
+    "/epuck1/heartbeat": (Header, STREAM),
     "/epuck1/cmd_vel": (TwistStamped, COMMAND),
 }
 
@@ -77,13 +79,15 @@ def test_random_messages_and_random_bytes_crash_nothing_and_move_nothing(run):
     assert np.isfinite(trace).all() and np.isfinite(np.array(run.observer.trace.object)).all()
     assert np.isfinite(run.bridge.world.poses()["epuck1"]).all()
     ours = [c for c in commands if c.header.frame_id == "base_link"]
-    assert ours and all(math.isfinite(c.twist.linear.x) and math.isfinite(c.twist.angular.z)
-                        for c in ours)
+    assert ours and all(
+        math.isfinite(c.twist.linear.x) and math.isfinite(c.twist.angular.z) for c in ours
+    )
 
 
 def test_mismatched_qos_shows_in_diagnostics(run):
-    weak = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT,
-                      durability=DurabilityPolicy.VOLATILE)
+    weak = QoSProfile(
+        depth=1, reliability=ReliabilityPolicy.BEST_EFFORT, durability=DurabilityPolicy.VOLATILE
+    )
     publisher = run.observer.create_publisher(PoseStamped, "/goal_pose", weak)
     mismatches = run.supervisor._diagnostics.qos_mismatches
     assert run.spinner.until(lambda: mismatches.get("/goal_pose", 0) > 0, 5.0)

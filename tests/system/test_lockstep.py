@@ -12,7 +12,6 @@ from nav_msgs.msg import OccupancyGrid, Path
 from rclpy.node import Node
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
-from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
 from push_bringup.lockstep import LockstepRun, final_errors
@@ -20,15 +19,23 @@ from push_msgs.msg import SupervisorState
 from push_ros.conversions import pose_stamped_to_ros
 from push_ros.qos import COMMAND, LATCHED
 from push_ros.scenario import load_scenario
+from tf2_msgs.msg import TFMessage
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 
 
 def noisy(name="short", seed=3):
-    return load_scenario(name).settings(
-        "bridge", seed=seed, motion_capture__position_noise=2e-4,
-        motion_capture__orientation_noise=1.7e-3, motion_capture__latency=0.01,
-    ).settings("controller", tracker__pose_delay=0.01)
+    return (
+        load_scenario(name)
+        .settings(
+            "bridge",
+            seed=seed,
+            motion_capture__position_noise=2e-4,
+            motion_capture__orientation_noise=1.7e-3,
+            motion_capture__latency=0.01,
+        )
+        .settings("controller", tracker__pose_delay=0.01)
+    )
 
 
 def run_once(seed=3):
@@ -57,8 +64,11 @@ def pushing(run):
     """Run until the box has been pushed a little."""
     run.observer.send_goal(run.scenario.goal)
     assert run.spin_until(
-        lambda: run.observer.state.state == SupervisorState.PUSHING
-        and run.observer.trace.object[-1][0] > -0.40, 60.0
+        lambda: (
+            run.observer.state.state == SupervisorState.PUSHING
+            and run.observer.trace.object[-1][0] > -0.40
+        ),
+        60.0,
     )
 
 
@@ -79,8 +89,14 @@ def test_equal_seeds_give_equal_runs_to_the_bit_also_in_a_fresh_process():
     here = run_once()
     assert here == run_once()
     code = "from tests.system.test_lockstep import run_once; print(run_once())"
-    out = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True,
-                         check=True, timeout=300)
+    out = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=300,
+    )
     assert out.stdout.split()[-1] == here
     assert run_once(seed=4) != here
 
@@ -92,8 +108,9 @@ class Outsider(Node):
         super().__init__("outsider")
         self.texts, self.maps, self.paths, self.tfs, self.markers = [], [], [], [], []
         self.commands = []
-        self.create_subscription(String, "/supervisor/status_text",
-                                 lambda m: self.texts.append(m.data), LATCHED)
+        self.create_subscription(
+            String, "/supervisor/status_text", lambda m: self.texts.append(m.data), LATCHED
+        )
         self.create_subscription(OccupancyGrid, "/map", self.maps.append, LATCHED)
         self.create_subscription(Path, "/push_path", self.paths.append, LATCHED)
         self.create_subscription(TFMessage, "/tf", self.tfs.append, 10)
@@ -233,8 +250,10 @@ def test_object_taken_away_is_noticed_and_replanned(short):
 def test_object_moved_before_the_push_is_noticed(short):
     short.observer.send_goal(short.scenario.goal)
     assert short.spin_until(
-        lambda: short.observer.state.state == SupervisorState.POSITIONING
-        and short.bridge.time > 1.0, 20.0
+        lambda: (
+            short.observer.state.state == SupervisorState.POSITIONING and short.bridge.time > 1.0
+        ),
+        20.0,
     )
     short.bridge.world.objects["box"].place(np.array([-0.45, 0.3, 0.0]))
     state = ends(short, 200.0)
@@ -258,8 +277,13 @@ def test_bad_commands_never_reach_the_wheels(short):
     assert short.spinner.until(lambda: stranger.get_subscription_count() > 0, 5.0)
     assert short.spin_until(lambda: len(short.observer.trace.robot) > 5, 5.0)
     good = short.bridge.time
-    for v, omega, stamp in [(np.nan, 0, good), (0, np.inf, good), (1e6, 0, good), (0.1, 0, -1),
-                            (0.1, 0, good + 99)]:
+    for v, omega, stamp in [
+        (np.nan, 0, good),
+        (0, np.inf, good),
+        (1e6, 0, good),
+        (0.1, 0, -1),
+        (0.1, 0, good + 99),
+    ]:
         message = TwistStamped()
         message.twist.linear.x, message.twist.angular.z = float(v), float(omega)
         message.header.stamp = pose_stamped_to_ros(np.zeros(3), max(stamp, 0.0)).header.stamp

@@ -76,9 +76,20 @@ def test_signals_at_random_moments(domain, number, seed, tmp_path):
     """FAULTS 18: everything ends within five seconds, none left, the bag is readable."""
     moment = np.random.default_rng([seed, int(number)]).uniform(0.05, 5.0)
     process = subprocess.Popen(
-        [sys.executable, "-m", "push_bringup.cli", "launch", "single", "--scenario", "short",
-         "--record", str(tmp_path / "bag")],
-        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
+        [
+            sys.executable,
+            "-m",
+            "push_bringup.cli",
+            "launch",
+            "single",
+            "--scenario",
+            "short",
+            "--record",
+            str(tmp_path / "bag"),
+        ],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
     )
     time.sleep(moment)
     children = children_of(process.pid)
@@ -113,9 +124,22 @@ def zombie(pid):
 
 def test_demo_ends_with_bag_pictures_and_report(domain, tmp_path):
     done = subprocess.run(
-        [sys.executable, "-m", "push_bringup.cli", "demo", "--scenario", "short", "--factor", "3",
-         "--out", str(tmp_path / "demo")],
-        capture_output=True, text=True, timeout=180, check=False,
+        [
+            sys.executable,
+            "-m",
+            "push_bringup.cli",
+            "demo",
+            "--scenario",
+            "short",
+            "--factor",
+            "3",
+            "--out",
+            str(tmp_path / "demo"),
+        ],
+        capture_output=True,
+        text=True,
+        timeout=180,
+        check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert "final error" in done.stdout and "pushing" in done.stdout
@@ -126,6 +150,9 @@ def test_demo_ends_with_bag_pictures_and_report(domain, tmp_path):
 def test_wrong_words_are_answered_with_what_to_do():
     done = subprocess.run(
         [sys.executable, "-m", "push_bringup.cli", "launch", "single", "--scenario", "atlantis"],
-        capture_output=True, text=True, timeout=60, check=False,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
     )
     assert done.returncode != 0 and "atlantis" in done.stderr and "env1-target1" in done.stderr
