@@ -22,7 +22,7 @@ $(INTERFACES): $(VENV)/bin/python constraints.txt $(shell find push_msgs tf2_msg
 	@echo "building the message packages (about a minute)"
 	$(BIN)/python -m pip install -q -c constraints.txt "ros-jazzy-rclpy[fastrtps]" ros-jazzy-common-interfaces
 	$(BIN)/python -m pip install -q --force-reinstall --no-deps ./push_msgs
-	$(BIN)/python -c "import tf2_msgs.msg" 2>/dev/null || \
+	$(BIN)/python -I -c "import tf2_msgs.msg" 2>/dev/null || \
 	  $(BIN)/python -m pip install -q --no-deps ./tf2_msgs
 	@touch $@
 

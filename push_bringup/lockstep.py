@@ -58,6 +58,11 @@ class Observer(Node):
         self.create_subscription(ControllerStatus, "/controller/status", self._on_status, STATUS)
         self._goal_publisher = self.create_publisher(PoseStamped, "/goal_pose", COMMAND)
 
+    def look_away(self) -> None:
+        """Stop observing, e.g. to measure a run without it."""
+        for subscription in list(self.subscriptions):
+            self.destroy_subscription(subscription)
+
     @property
     def connected(self) -> bool:
         """Whether a goal would be received."""

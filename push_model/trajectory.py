@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,10 @@ class Trajectory:
         if self.time[0] != 0.0 or not (np.diff(self.time) > 0.0).all():
             raise ValueError("a trajectory's time must start at 0 and increase strictly")
 
+    @cached_property
+    def _table(self) -> Array:
+        return np.hstack([self.pose, self.twist])
+
     @property
     def duration(self) -> float:
         """[s]."""
@@ -41,12 +46,13 @@ class Trajectory:
 
     def sample(self, t: NDArray[np.floating[Any]]) -> tuple[Array, Array]:
         """Poses ``(m, 3)`` and twists ``(m, 2)`` at times ``(m,)``; at rest beyond the ends."""
-        index = np.searchsorted(self.time, t, side="right") - 1
-        index = np.clip(index, 0, len(self.time) - 2)
-        span = self.time[index + 1] - self.time[index]
-        w = np.clip((t - self.time[index]) / span, 0.0, 1.0)[:, None]
-        pose = (1.0 - w) * self.pose[index] + w * self.pose[index + 1]
-        twist = (1.0 - w) * self.twist[index] + w * self.twist[index + 1]
+        index = np.clip(np.searchsorted(self.time, t, side="right") - 1, 0, len(self.time) - 2)
+        begin = self.time[index]
+        w = np.clip((t - begin) / (self.time[index + 1] - begin), 0.0, 1.0)[:, None]
+        table = self._table
+        first = table[index]
+        row = first + w * (table[index + 1] - first)
+        pose, twist = row[:, :3], row[:, 3:]
         twist[(t < 0.0) | (t > self.duration)] = 0.0
         return pose, twist
 

@@ -15,6 +15,7 @@ from push_mpc.settings import MpcSettings
 
 _ROUNDS = 12  # of row generation
 _TOLERANCE = 1e-6  # of a row, in its own unit
+_NEAR = 0.02  # room of a row that is kept for the next solve, in its own unit
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,9 @@ class LtvMpc:
         """Forget the previous solution."""
         self._nominal = np.zeros((self.settings.horizon, 2))
         self._previous = np.zeros(2)
-        self._active = np.zeros(0, dtype=np.int64)  # rows that bound the previous solution
+        # rows that bound the previous solution, and rows that nearly did
+        self._active = np.zeros(0, dtype=np.int64)
+        self._near = np.zeros(0, dtype=np.int64)
 
     def solve(
         self, error: Array, reference: Reference, limits: CurvatureLimits | None, circles: Array
@@ -159,18 +162,22 @@ class LtvMpc:
                 self._H, self._f, self._G[:rows], self._b[:rows], self._low, self._high
             )
             return (result.z if result.solved else None), result.status
+        # Row generation: start from the rows near the previous solution, add what is violated.
         self._chosen[:] = False
-        self._chosen[self._active[self._active < rows]] = True
+        self._chosen[self._near[self._near < rows]] = True
+        guess = self._active
         for _ in range(_ROUNDS):
             index = np.flatnonzero(self._chosen[:rows])
+            G, b = self._G[index], self._b[index]
             result = self._solver.solve(
-                self._H, self._f, self._G[index], self._b[index], self._low, self._high
+                self._H, self._f, G, b, self._low, self._high, np.isin(index, guess)
             )
             if not result.solved:
                 return None, result.status
+            room = b - G @ result.z
+            guess = index[room <= _TOLERANCE]
             if violated(self._G, self._b, rows, result.z, _TOLERANCE, self._chosen) == 0:
-                tight = self._G[index] @ result.z >= self._b[index] - _TOLERANCE
-                self._active = index[tight]
+                self._active, self._near = guess, index[room <= _NEAR]
                 return result.z, result.status
         result = self._solver.solve(
             self._H, self._f, self._G[:rows], self._b[:rows], self._low, self._high

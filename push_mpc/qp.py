@@ -9,6 +9,7 @@ from typing import Protocol
 import daqp
 import numpy as np
 import osqp
+from numpy.typing import NDArray
 from scipy import sparse
 
 from push_model.arrays import Array
@@ -28,8 +29,21 @@ class QpBackend(Protocol):
 
     row_generation: bool
 
-    def solve(self, H: Array, f: Array, G: Array, b: Array, low: Array, high: Array) -> QpSolution:
-        """H ``(n, n)`` positive definite, f, low, high ``(n,)``, G ``(m, n)``, b ``(m,)``."""
+    def solve(
+        self,
+        H: Array,
+        f: Array,
+        G: Array,
+        b: Array,
+        low: Array,
+        high: Array,
+        active: NDArray[np.bool_] | None = None,
+    ) -> QpSolution:
+        """Solve it.
+
+        H ``(n, n)`` positive definite, f, low, high ``(n,)``, G ``(m, n)``, b ``(m,)``;
+        active ``(m,)``: rows that are expected to hold with equality, to start from.
+        """
         ...
 
 
@@ -38,12 +52,23 @@ class DaqpBackend:
 
     row_generation = True
 
-    def solve(self, H: Array, f: Array, G: Array, b: Array, low: Array, high: Array) -> QpSolution:
+    def solve(
+        self,
+        H: Array,
+        f: Array,
+        G: Array,
+        b: Array,
+        low: Array,
+        high: Array,
+        active: NDArray[np.bool_] | None = None,
+    ) -> QpSolution:
         """See QpBackend."""
         m = len(b)
         upper = np.concatenate([high, b])
         lower = np.concatenate([low, np.full(m, -1e30)])
         sense = np.zeros(len(upper), dtype=np.int32)
+        if active is not None:
+            sense[len(f) :] = active  # 1 marks a member of the first working set
         z, _, flag, _ = daqp.solve(H, f, G, upper, lower, sense)
         z = np.asarray(z)
         return QpSolution(z, flag >= 1 and bool(np.isfinite(z).all()), f"daqp {flag}")
@@ -63,7 +88,16 @@ class OsqpBackend:
             "max_iter": 20000,
         }
 
-    def solve(self, H: Array, f: Array, G: Array, b: Array, low: Array, high: Array) -> QpSolution:
+    def solve(
+        self,
+        H: Array,
+        f: Array,
+        G: Array,
+        b: Array,
+        low: Array,
+        high: Array,
+        active: NDArray[np.bool_] | None = None,
+    ) -> QpSolution:
         """See QpBackend. Set up anew each time: a warm solver that met a NaN stays poisoned."""
         n, m = len(f), len(b)
         solver = osqp.OSQP()

@@ -110,6 +110,7 @@ class TrajectoryTracker:
         self._task = task
         self._time = 0.0
         self._overtime = 0.0
+        self._lag = 0.0  # [m] behind the reference, at the tick before
         self._grasp = None if task.push is None else task.push.grasp.copy()
         self._grasp_seen = False
         self._lost = 0.0
@@ -137,8 +138,9 @@ class TrajectoryTracker:
             raise RuntimeError("tick without a task")
         robot = self._without_delay(robot, dt)
         shift = self._shift(task, dt, robot, item)
-        reference, rate = self._advance(task, dt, robot, shift)
+        reference = self._advance(task, dt, shift)
         error = self._error(robot, reference)
+        self._lag = -float(error[0])
         gap, turn = self._final_errors(task, robot, item)
         margin = self._obstacle_margin(task, robot)
         offset = (
@@ -172,7 +174,6 @@ class TrajectoryTracker:
         if limits is not None and self.v > 1e-3:
             kappa = self.omega / self.v
             curvature_margin = min(limits.maximum - kappa, kappa - limits.minimum)
-        del rate
         return Tick(
             self.v,
             self.omega,
@@ -213,14 +214,10 @@ class TrajectoryTracker:
             self._grasp = self._grasp + gain * change
         return se2.compose(task.push.grasp, se2.inverse(self._grasp))
 
-    def _advance(
-        self, task: Task, dt: float, robot: Array, shift: Array
-    ) -> tuple[Reference, float]:
+    def _advance(self, task: Task, dt: float, shift: Array) -> Reference:
         """Move the reference on, slower when the robot lags behind."""
         s = self.settings
-        now, _ = task.trajectory.sample(np.array([self._time]))
-        lag = -float(se2.between(se2.compose(now[0], shift), robot)[0])
-        rate = min(1.0, max(0.0, (s.lag_end - lag) / (s.lag_end - s.lag_begin)))
+        rate = min(1.0, max(0.0, (s.lag_end - self._lag) / (s.lag_end - s.lag_begin)))
         self._time = min(self._time + rate * dt, task.trajectory.duration)
         p, h = self.mpc.settings.horizon, self.mpc.settings.step
         pose, twist = task.trajectory.sample(self._time + rate * h * np.arange(p + 1))
@@ -233,7 +230,7 @@ class TrajectoryTracker:
         ahead, across = v - omega * shift[1], omega * shift[0]
         ct, st = math.cos(shift[2]), math.sin(shift[2])
         body = np.column_stack([ct * ahead + st * across, -st * ahead + ct * across, omega])
-        return Reference(moved, body), rate
+        return Reference(moved, body)
 
     def _error(self, robot: Array, reference: Reference) -> Array:
         """(2.37)."""

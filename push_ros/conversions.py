@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, TransformStamped, TwistStamped
+from geometry_msgs.msg import Pose, PoseStamped, TransformStamped, TwistStamped
 from nav_msgs.msg import OccupancyGrid as GridMessage
 from nav_msgs.msg import Path
 
@@ -35,10 +35,11 @@ def time_from_ros(stamp: Time) -> float:
 
 def pose_to_ros(pose: Array) -> Pose:
     """Pose ``(3,)`` to geometry_msgs/Pose."""
-    _, _, z, w = se2.quaternion_from_yaw(float(pose[2]))
-    return Pose(
-        position=Point(x=float(pose[0]), y=float(pose[1])), orientation=Quaternion(z=z, w=w)
-    )
+    message = Pose()  # filled in place: parts made apart would be made twice
+    message.position.x, message.position.y = float(pose[0]), float(pose[1])
+    q = message.orientation
+    _, _, q.z, q.w = se2.quaternion_from_yaw(float(pose[2]))
+    return message
 
 
 def pose_stamped_to_ros(pose: Array, seconds: float) -> PoseStamped:

@@ -158,6 +158,7 @@ class World:
             return
         tracked = [(b.body, link) for b in self.objects.values() for link in b.side_links]
         tracked += [(r.body, BODY) for r in self.robots.values()]
+        bodies = {body for body, _ in tracked}
         for _ in range(count):
             pb.stepSimulation(physicsClientId=client)
             self._steps += 1
@@ -165,7 +166,9 @@ class World:
                 for point in pb.getContactPoints(
                     bodyA=body, linkIndexA=link, physicsClientId=client
                 ):
-                    self._add_contact(point)
+                    # PyBullet lists a pair of tracked bodies twice, once from each side.
+                    if point[9] > 0.0 and not (point[2] in bodies and body > point[2]):
+                        self._add_contact(point)
 
     def _clear_contacts(self) -> None:
         self._steps = 0
@@ -173,10 +176,8 @@ class World:
 
     def _add_contact(self, point: tuple) -> None:  # type: ignore[type-arg]
         a, b, normal, load = point[1], point[2], point[7], point[9]
-        if load <= 0.0 or b == self._floor:
+        if b == self._floor:
             return
-        if b in self._names and a > b and self._names[b] in self._bodies:
-            return  # PyBullet lists a pair of tracked bodies twice, once from each side
         sums, steps = self._touching.setdefault((a, b), ([0.0] * 9, set()))
         t1, d1, t2, d2 = point[10], point[11], point[12], point[13]
         for i in range(3):

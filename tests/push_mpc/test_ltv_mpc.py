@@ -128,7 +128,7 @@ class Liar:
     def __init__(self):
         self.honest, self.lying = DaqpBackend(), True
 
-    def solve(self, H, f, G, b, low, high):
+    def solve(self, H, f, G, b, low, high, active=None):
         if self.lying:
             z = np.full(len(f), np.nan)
             return QpSolution(z, bool(np.isfinite(z).all()), "optimal")

@@ -124,7 +124,7 @@ def test_a_blocked_way_ends_the_task():
 class Broken:
     row_generation = True
 
-    def solve(self, H, f, G, b, low, high):
+    def solve(self, H, f, G, b, low, high, active=None):
         return QpSolution(np.zeros(len(f)), False, "broken")
 
 
