@@ -59,6 +59,7 @@ class EllipsoidLimitSurface:
 
     def wrench(self, twist: Array) -> Array:
         """(3.4)."""
+        twist = _direction(twist)
         weighted: Array = self.twist_metric @ twist
         power = float(twist @ weighted)
         return np.zeros(3) if power <= 0.0 else weighted / math.sqrt(power)
@@ -100,6 +101,7 @@ class PressureLimitSurface:
 
     def wrench(self, twist: Array) -> Array:
         """Coulomb friction summed over the points."""
+        twist = _direction(twist)
         vx = twist[0] - twist[2] * self.points[:, 1]
         vy = twist[1] + twist[2] * self.points[:, 0]
         speed = np.hypot(vx, vy)
@@ -112,6 +114,13 @@ class PressureLimitSurface:
         """The ellipsoid with the same greatest force and pure-spin torque."""
         torque = self.max_force * float(self.weights @ np.hypot(*self.points.T))
         return EllipsoidLimitSurface(self.max_force, torque)
+
+
+def _direction(twist: Array) -> Array:
+    """The twist at unit size, zero for one too small to have a direction."""
+    size = float(np.abs(twist).max())
+    direction: Array = twist / size if size > 1e-100 else np.zeros(3)
+    return direction
 
 
 def uniform_pressure_radius(shape: Shape) -> float:

@@ -59,6 +59,7 @@ class LtvMpc:
         self._rollout = np.zeros((p + 1, 5))
         self._G, self._b = np.zeros((rows, n)), np.zeros(rows)
         self._chosen = np.zeros(rows, dtype=np.bool_)
+        self._guess = np.zeros(rows, dtype=np.bool_)
         self._Q = np.array(settings.state_weight)
         self._P = settings.terminal_factor * self._Q
         self._R, self._Rd = np.array(settings.input_weight), np.array(settings.input_rate_weight)
@@ -91,11 +92,8 @@ class LtvMpc:
         circles: ``(m, 3)`` x, y, least distance of the axle midpoint; m <= max_obstacles.
         """
         started = time.thread_time()
-        if not (
-            np.isfinite(error).all()
-            and np.isfinite(reference.pose).all()
-            and np.isfinite(reference.twist).all()
-        ):
+        # a sum is finite only if every term is
+        if not math.isfinite(error.sum() + reference.pose.sum() + reference.twist.sum()):
             return self._failed("input is not finite", started)
         rows = self._assemble(error, reference, limits, circles)
         z, status = self._optimise(rows)
@@ -165,19 +163,22 @@ class LtvMpc:
         # Row generation: start from the rows near the previous solution, add what is violated.
         self._chosen[:] = False
         self._chosen[self._near[self._near < rows]] = True
-        guess = self._active
+        self._guess[:] = False
+        self._guess[self._active[self._active < rows]] = True
         for _ in range(_ROUNDS):
             index = np.flatnonzero(self._chosen[:rows])
             G, b = self._G[index], self._b[index]
             result = self._solver.solve(
-                self._H, self._f, G, b, self._low, self._high, np.isin(index, guess)
+                self._H, self._f, G, b, self._low, self._high, self._guess[index]
             )
             if not result.solved:
                 return None, result.status
             room = b - G @ result.z
-            guess = index[room <= _TOLERANCE]
+            tight = index[room <= _TOLERANCE]
+            self._guess[:] = False
+            self._guess[tight] = True
             if violated(self._G, self._b, rows, result.z, _TOLERANCE, self._chosen) == 0:
-                self._active, self._near = guess, index[room <= _NEAR]
+                self._active, self._near = tight, index[room <= _NEAR]
                 return result.z, result.status
         result = self._solver.solve(
             self._H, self._f, self._G[:rows], self._b[:rows], self._low, self._high

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import OccupancyGrid
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
@@ -219,11 +220,18 @@ class SupervisorNode(Node):
 
     def _on_poses(self, data: bytes) -> None:
         """Take a frame every 50 ms; the rest of a fast stream is not even deserialised."""
-        # CDR: four bytes of encapsulation, then the header's stamp.
-        seconds, nanoseconds = struct.unpack_from("<iI", data, 4)
-        if 0.0 <= seconds + 1e-9 * nanoseconds - self._poses.stamp < _POSE_PERIOD:
+        try:
+            # CDR: four bytes of encapsulation, then the header's stamp.
+            seconds, nanoseconds = struct.unpack_from("<iI", data, 4)
+            if 0.0 <= seconds + 1e-9 * nanoseconds - self._poses.stamp < _POSE_PERIOD:
+                return
+            message = deserialize_message(data, NamedPoses)
+        except (struct.error, RuntimeError, RCLError) as error:
+            self._diagnostics.refuse("/poses", f"unreadable: {error}")
             return
-        message = deserialize_message(data, NamedPoses)
+        self._take_poses(message)
+
+    def _take_poses(self, message: NamedPoses) -> None:
         verdict = self._poses.begin(time_from_ros(message.header.stamp))
         if message.header.frame_id != "map" or verdict is Stamp.REFUSED:
             return

@@ -4,12 +4,18 @@ import itertools
 import os
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from push_ros.process import prepare_environment
 from push_ros.scenario import load_scenario
 
 os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 90)
 prepare_environment()
+# The same examples every time, on a machine of any speed.
+settings.register_profile(
+    "repeatable", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile("repeatable")
 _domains = itertools.count()
 
 
