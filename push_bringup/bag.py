@@ -1,6 +1,7 @@
 """Bags: rosbag2 folders with one MCAP file, written in small chunks so that a killed writer loses
 little, readable by rosbag2, Foxglove, the ``rosbags`` and the ``mcap`` libraries."""
 
+import contextlib
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -78,6 +79,12 @@ class BagWriter:
         self._writer.finish()
         self._file.close()
         self._write_metadata()
+
+    def abandon(self) -> None:
+        """Stop writing where nothing more can be written; whole chunks stay readable."""
+        self.closed = True
+        with contextlib.suppress(OSError):
+            self._file.close()
 
     def _write_metadata(self) -> None:
         topics = [

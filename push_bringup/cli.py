@@ -11,6 +11,8 @@ from pathlib import Path
 from push_model.settings import SettingsError
 from push_ros.process import prepare_environment
 
+_LIVE_DEADLINE = 0.03  # [s] wall time of a solve in live use; a lockstep run must not depend on it
+
 
 def _warm_up(arguments: argparse.Namespace) -> int:
     """Compile what is compiled at first use, so that no run waits for it."""
@@ -54,7 +56,11 @@ def _node(arguments: argparse.Namespace) -> int:
         if arguments.name == "controller":
             from push_mpc.node import ControllerNode
 
-            return ControllerNode(scenario)
+            live = {"tracker__deadline": _LIVE_DEADLINE}
+            given = scenario.parameters.get("controller", {}).get("tracker", {})
+            return ControllerNode(
+                scenario if "deadline" in given else scenario.settings("controller", **live)
+            )
         if arguments.name == "supervisor":
             from push_supervisor.node import SupervisorNode
 

@@ -94,7 +94,11 @@ class RecorderNode(Node):
         if self.writer.closed:
             return
         simulated = self._sim_time > 0 or self.count_publishers("/clock") > 0
-        self.writer.write(topic, self._sim_time if simulated else time.time_ns(), bytes(data))
+        try:
+            self.writer.write(topic, self._sim_time if simulated else time.time_ns(), bytes(data))
+        except OSError as error:  # e.g. the disk is full: what is written stays readable
+            self.get_logger().error(f"recording ends: {error}")
+            self.writer.abandon()
 
     def destroy_node(self) -> None:
         """Finish the bag too."""

@@ -47,5 +47,8 @@ class TrackerSettings:
     contact_turn: float = bounded(0.25, low=0.01, high=3.2, doc="[rad] object against bumper")
     contact_time: float = bounded(0.5, low=0.0, high=10.0, doc="[s] until contact counts as lost")
     off_course: float = bounded(0.08, low=1e-3, high=5.0, doc="[m] from the reference")
+    deadline: float = bounded(
+        0.0, low=0.0, high=10.0, doc="[s] wall time a solve may take in live use; 0: not watched"
+    )
     stuck_time: float = bounded(1.5, low=0.1, high=60.0, doc="[s] commanded but not moving")
     stuck_way: float = bounded(0.03, low=1e-3, high=1.0, doc="[m] commanded in that time")

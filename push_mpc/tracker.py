@@ -6,8 +6,9 @@ error is zero when the object, not the robot, is on its way.
 """
 
 import math
+import time
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
@@ -165,7 +166,7 @@ class TrajectoryTracker:
         if finished:
             self.stop()
         else:
-            solve = self.mpc.solve(error, reference, limits, self._nearest(task, robot))
+            solve = self._solve(task, robot, error, reference, limits)
             self._apply(solve, dt, limits)
             if self._bad > _SOLVER_PATIENCE:
                 finished, code, message = True, TrackError.SOLVER_FAILED, solve.reason
@@ -189,6 +190,22 @@ class TrajectoryTracker:
             margin,
             offset,
         )
+
+    def _solve(
+        self,
+        task: Task,
+        robot: Array,
+        error: Array,
+        reference: Reference,
+        limits: CurvatureLimits | None,
+    ) -> MpcResult:
+        """Solve; an answer after the deadline is as bad as none."""
+        started = time.perf_counter()
+        solve = self.mpc.solve(error, reference, limits, self._nearest(task, robot))
+        late = time.perf_counter() - started
+        if 0.0 < self.settings.deadline < late:
+            return replace(solve, solved=False, reason=f"late: {1e3 * late:.1f} ms")
+        return solve
 
     def _without_delay(self, robot: Array, dt: float) -> Array:
         """The robot's pose now, from the delayed one and the commands since."""

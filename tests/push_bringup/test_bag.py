@@ -71,3 +71,17 @@ def test_killed_writer_keeps_its_whole_chunks(tmp_path):
     assert recover(tmp_path / "bag", tmp_path / "whole") == len(kept)
     with AnyReader([tmp_path / "whole"]) as reader:
         assert sum(1 for _ in reader.messages()) == len(kept)
+
+
+def test_full_disk_ends_the_recording_and_nothing_else(tmp_path, monkeypatch):
+    writer = write(tmp_path / "bag", 3000)
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(writer._writer, "add_message", full)
+    with pytest.raises(OSError, match="No space"):
+        writer.write("/poses", 1, message(1))
+    writer.abandon()
+    writer.close()  # safe afterwards
+    assert len(list(read_bag(tmp_path / "bag"))) > 1000

@@ -1,5 +1,6 @@
 """The tracker in closed loop with ideal kinematics, and everything that can go wrong."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from push_model import CurvatureLimits, DifferentialDrive, line, se2, unicycle_step
 from push_mpc import (
+    DaqpBackend,
     LtvMpc,
     MpcSettings,
     Push,
@@ -161,3 +163,43 @@ def test_delay_is_made_good_by_the_commands_since():
                 break
         errors[assumed] = worst
     assert errors[0.05] < 0.5 * errors[0.0]
+
+
+class Slow:
+    """A solver that thinks for longer than it may."""
+
+    row_generation = True
+
+    def __init__(self):
+        self.pause = 0.0
+        self.honest = DaqpBackend()
+
+    def solve(self, H, f, G, b, low, high, active=None):
+        time.sleep(self.pause)
+        return self.honest.solve(H, f, G, b, low, high, active)
+
+
+def test_late_solves_fade_to_a_stop_and_one_in_time_goes_on():
+    """FAULTS 6: an overrun is counted, the command decays; the next good tick recovers."""
+    solver = Slow()
+    tracker = make(replace(TrackerSettings(), deadline=0.05), solver)
+    tracker.start(task())
+    *_, (tick, robot) = drive(tracker, np.zeros(3), 2)
+    speed, failures = tick.v, tracker.failures
+    solver.pause = 0.08
+    ticks = [t for _, (t, _) in zip(range(5), drive(tracker, robot, 1), strict=False)]
+    assert tracker.failures == failures + 5
+    assert all(t.v < speed and "late" in t.solve.reason for t in ticks)
+    slowest = ticks[-1].v
+    solver.pause = 0.0
+    *_, (tick, _) = drive(tracker, robot, 0.5)
+    assert tick.v > slowest and tick.solve.solved
+
+
+def test_warm_up_takes_the_first_solve_spike():
+    """FAULTS 6: after it the first solve costs no more than a few ordinary ones."""
+    tracker = make()
+    tracker.warm_up()
+    tracker.start(task())
+    times = [tick.solve.solve_time for tick, _ in drive(tracker, np.zeros(3), 0.5)]
+    assert times[0] < 20 * np.median(times)

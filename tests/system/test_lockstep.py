@@ -202,6 +202,21 @@ def test_nan_poses_stop_the_robot_and_good_ones_let_it_go_on(short):
     assert final_errors(short.observer.trace, short.scenario.goal)[0] < 0.02
 
 
+def test_stopped_stream_stops_the_robot_and_its_return_lets_it_go_on():
+    """FAULTS 7: no frames at all for half a second of sim time."""
+    scenario = load_scenario("short").settings("bridge", lockstep_timeout=0.05)
+    with LockstepRun(scenario, quiet=True) as run:
+        run.start()
+        pushing(run)
+        until = run.bridge.time + 0.5
+        tamper(run, lambda message: [message] if run.bridge.time > until else [])
+        moved(run, 0.3)
+        assert moved(run, 0.15) < 2e-4
+        assert run.bridge.lockstep_timeouts > 10
+        assert ends(run).error_code == 0
+        assert final_errors(run.observer.trace, scenario.goal)[0] < 0.02
+
+
 def test_jumped_pose_is_not_chased(short):
     """FAULTS 9: zeros, as a tracking system reports a lost body."""
     pushing(short)

@@ -32,8 +32,10 @@ def wait(monitor, condition, limit):
     return condition()
 
 
-@pytest.mark.parametrize("respawn", [True, False])
-def test_killed_controller(domain, respawn, tmp_path):
+@pytest.mark.parametrize(
+    ("victim", "respawn"), [("controller", True), ("controller", False), ("supervisor", False)]
+)
+def test_killed_node(domain, victim, respawn, tmp_path):
     """FAULTS 11: wheels stop, the launcher names the dead; with respawn the goal is reached."""
     said = []
     launcher = Launcher(
@@ -45,13 +47,13 @@ def test_killed_controller(domain, respawn, tmp_path):
             assert monitor.connect(40.0, lambda: not launcher.check())
             monitor.send_goal((0.1, 0.04, 0.1))
             assert wait(monitor, lambda: monitor._position[0] > -0.35, 40.0)
-            (controller,) = [c for c in launcher.children if c.name == "controller"]
-            controller.process.send_signal(signal.SIGKILL)
+            (child,) = [c for c in launcher.children if c.name == victim]
+            child.process.send_signal(signal.SIGKILL)
             end = time.monotonic() + 2.0
             while not said and time.monotonic() < end:
                 launcher.check()
                 time.sleep(0.02)
-            assert any("controller died (signal 9)" in text for text in said)
+            assert any(f"{victim} died (signal 9)" in text for text in said)
             if not respawn:
                 wait(monitor, lambda: False, 0.5)
                 before = monitor._position
