@@ -15,7 +15,7 @@ from push_mpc.settings import MpcSettings
 
 _ROUNDS = 12  # of row generation
 _TOLERANCE = 1e-6  # of a row, in its own unit
-_NEAR = 0.02  # room of a row that is kept for the next solve, in its own unit
+_NEAR = 0.005  # room of a row that is kept for the next solve, in its own unit
 
 
 @dataclass(frozen=True)
