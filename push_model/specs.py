@@ -20,7 +20,7 @@ class BumperSpec:
     kind: Literal["flat"]
     width: float = bounded(low=1e-3, high=2.0, doc="[m] of the flat face")
     distance: float = bounded(low=1e-3, high=2.0, doc="[m] D, axle to face")
-    height: float = bounded(0.03, low=1e-3, high=1.0, doc="[m] of the face")
+    height: float = bounded(0.006, low=1e-3, high=1.0, doc="[m] of the face, at axle height")
 
 
 @dataclass(frozen=True)

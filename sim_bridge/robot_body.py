@@ -28,7 +28,7 @@ def robot_urdf(spec: RobotSpec) -> str:
     b = spec.bumper
     thickness = min(0.005, b.distance / 4.0)
     body_z = h / 2.0 - wr + 0.005  # the body's underside clears the floor by 5 mm
-    bumper_z = b.height / 2.0 - wr + 0.008
+    bumper_z = 0.0  # at the height of the axle: far from the edges of what it pushes
     collisions = (
         _collision(f'<cylinder radius="{r}" length="{h - 0.005}"/>', 0.0, body_z)
         + _collision(
