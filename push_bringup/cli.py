@@ -153,6 +153,8 @@ def _demo(arguments: argparse.Namespace) -> int:
         launcher.stop()
     if stopped:
         return 130
+    for number in (signal.SIGINT, signal.SIGTERM):  # nothing is left to stop: just end
+        signal.signal(number, lambda *_: sys.exit(130))
     print("writing the report", flush=True)
     errors = write_report(out / "bag", out)
     position, orientation = errors["position_error_m"], errors["orientation_error_rad"]
