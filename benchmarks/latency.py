@@ -1,6 +1,5 @@
 """From poses to command across processes at 100 Hz, the controller following a trajectory."""
 
-import os
 import time
 from typing import Any
 
@@ -16,13 +15,13 @@ from push_model import line, unicycle_step
 from push_msgs.action import FollowTrajectory
 from push_msgs.msg import NamedPose, NamedPoses
 from push_ros.conversions import pose_to_ros, time_to_ros, trajectory_to_ros
-from push_ros.process import Spinner, prepare_environment
+from push_ros.process import Spinner, claim_domain, prepare_environment
 from push_ros.qos import COMMAND, STREAM
 
 
 def run(seconds: float = 15.0) -> dict[str, Any]:
     """Wall time from publishing a frame to receiving its command."""
-    os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 100)
+    claim_domain()
     prepare_environment()
     launcher = Launcher([Child("controller", ["controller", "--scenario", "short"])])
     launcher.start()

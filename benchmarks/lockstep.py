@@ -1,6 +1,5 @@
 """The whole graph in lockstep beside the bare physics at the same step settings."""
 
-import os
 import time
 from typing import Any
 
@@ -8,13 +7,14 @@ import numpy as np
 
 from benchmarks.measure import at_least
 from push_bringup.lockstep import LockstepRun
+from push_ros.process import claim_domain
 from push_ros.scenario import load_scenario
 from sim_bridge.world import World
 
 
 def run(seconds: float = 20.0) -> dict[str, Any]:
     """Sim time over CPU time of this thread, both in the middle of a push."""
-    os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 100)
+    claim_domain()
     scenario = load_scenario("env1-target1")
     factors: dict[str, list[float]] = {"graph": [], "bare": []}
     with LockstepRun(scenario, quiet=True) as graph:

@@ -2,7 +2,6 @@
 
 import csv
 import json
-import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +20,7 @@ from push_bringup.trials import Row, run_trials
 from push_model import se2
 from push_model.arrays import Array
 from push_planner import DistanceField, PlannerSettings, PushScene
+from push_ros.process import claim_domain
 from push_ros.scenario import Scenario, load_scenario
 
 SUCCESS_POSITION = 0.02
@@ -97,7 +97,7 @@ def min_clearance(scenario: Scenario, trace: Trace) -> float:
 
 def single_robot_trial(task: SingleRobotTask) -> Row:
     """Push the object to the scenario's goal once."""
-    os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 100)
+    claim_domain()
     believed, world, drawn = draw_world(task)
     if believed.goal is None:
         raise ValueError(f"scenario '{task.scenario}' has no goal")

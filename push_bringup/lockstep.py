@@ -18,7 +18,7 @@ from push_mpc.node import ControllerNode
 from push_msgs.msg import Contacts, ControllerStatus, NamedPoses, PushPlan, SupervisorState
 from push_planner.node import PlannerNode
 from push_ros.conversions import pose_stamped_to_ros, time_from_ros
-from push_ros.process import Spinner, prepare_environment
+from push_ros.process import Spinner, claim_domain, prepare_environment
 from push_ros.qos import COMMAND, LATCHED, STATUS, STREAM
 from push_ros.scenario import Scenario
 from push_supervisor.node import SupervisorNode
@@ -150,7 +150,8 @@ class LockstepRun:
         prepare_environment()
         if quiet:
             set_logger_level("", LoggingSeverity.WARN)
-        os.environ.setdefault("ROS_DOMAIN_ID", str(100 + os.getpid() % 100))
+        if "ROS_DOMAIN_ID" not in os.environ:
+            claim_domain()
         if not rclpy.ok():
             rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
             self._owns_context = True

@@ -1,13 +1,15 @@
 """Starting, spinning and stopping nodes."""
 
 import contextlib
+import fcntl
 import os
 import signal
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError
@@ -17,6 +19,8 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from push_model.settings import SettingsError
+
+_claims: list[IO[str]] = []
 
 
 def prepare_environment(environment: dict[str, str] | None = None) -> dict[str, str]:
@@ -28,6 +32,27 @@ def prepare_environment(environment: dict[str, str] | None = None) -> dict[str, 
     profile = Path(__file__).parent / "discovery.xml"
     env.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(profile))
     return env  # type: ignore[return-value]
+
+
+def claim_domain() -> int:
+    """Set ROS_DOMAIN_ID to one that no other run on this machine has claimed; returns it.
+
+    The claim is a locked file, held until this process ends. Two lockstep runs on one domain would
+    answer each other's frames.
+    """
+    for offset in range(100):
+        domain = 1 + (os.getpid() + offset) % 100
+        path = Path(tempfile.gettempdir()) / f"planar_push_domain_{domain}.lock"
+        file = path.open("a")
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            file.close()
+            continue
+        _claims.append(file)
+        os.environ["ROS_DOMAIN_ID"] = str(domain)
+        return domain
+    raise RuntimeError("all hundred ROS domains for lockstep runs are in use")
 
 
 class Spinner:

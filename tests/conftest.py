@@ -1,22 +1,18 @@
 """Shared by all tests: small scenarios, and ROS contexts that leave nothing behind."""
 
-import itertools
-import os
-
 import pytest
 from hypothesis import HealthCheck, settings
 
-from push_ros.process import prepare_environment
+from push_ros.process import claim_domain, prepare_environment
 from push_ros.scenario import load_scenario
 
-os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 90)
+claim_domain()  # every run of the tests has a domain of its own
 prepare_environment()
 # The same examples every time, on a machine of any speed.
 settings.register_profile(
     "repeatable", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("repeatable")
-_domains = itertools.count()
 
 
 @pytest.fixture(scope="session")
@@ -35,13 +31,12 @@ def box(scenario):
 
 
 @pytest.fixture
-def ros(monkeypatch):
+def ros():
     """A ROS context on a domain of its own."""
     import rclpy
     from rclpy.signals import SignalHandlerOptions
 
-    domain = 1 + (os.getpid() * 7 + next(_domains)) % 100
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+    claim_domain()
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     yield
     rclpy.try_shutdown()

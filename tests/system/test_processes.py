@@ -12,13 +12,14 @@ import pytest
 from push_bringup.bag import read_bag
 from push_bringup.launcher import Launcher, single_robot
 from push_bringup.monitor import Monitor
+from push_ros.process import claim_domain
 
 FACTOR = ["--ros", "-p", "real_time_factor:=3.0"]
 
 
 @pytest.fixture
-def domain(monkeypatch):
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(1 + (os.getpid() * 13 + time.time_ns() // 1000) % 100))
+def domain():
+    claim_domain()
 
 
 def alive(group):
