@@ -26,7 +26,7 @@ class MpcSettings:
     slack_linear: float = bounded(1000.0, low=0.0, high=1e6, doc="price of a softened row")
     slack_quadratic: float = bounded(20000.0, low=0.0, high=1e8, doc="price of a softened row")
     max_slack: float = bounded(0.3, low=0.0, high=100.0, doc="violation that counts as infeasible")
-    backend: Literal["daqp", "osqp"] = "daqp"
+    backend: Literal["active_set", "daqp", "osqp"] = "active_set"
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from push_mpc.prediction import SLACKS, condense, discretise
+from push_mpc.prediction import OUTPUTS, SLACKS, condense, discretise
 
 numbers = st.floats(-1, 1)
 
@@ -35,27 +35,11 @@ def build(e0, nominal, ref, h=0.1, Q=None):
     p = len(nominal)
     n = 2 * p + SLACKS
     H, f = np.zeros((n, n)), np.zeros(n)
-    S, g, roll = np.zeros((p, 5, 2 * p)), np.zeros((p, 5)), np.zeros((p + 1, 5))
+    S, g, roll = np.zeros((p, OUTPUTS, 2 * p)), np.zeros((p, OUTPUTS)), np.zeros((p + 1, 5))
     Q = np.ones(5) if Q is None else Q
-    condense(
-        e0,
-        nominal,
-        np.array([0.1, -0.2]),
-        ref,
-        h,
-        Q,
-        3 * Q,
-        np.array([0.3, 0.2]),
-        np.array([0.1, 0.4]),
-        1.0,
-        10.0,
-        H,
-        f,
-        S,
-        g,
-        roll,
-    )
-    return H, f, S, g, roll
+    before, R, Rd = np.array([0.1, -0.2]), np.array([0.3, 0.2]), np.array([0.1, 0.4])
+    condense(e0, nominal, before, ref, h, Q, 3 * Q, R, Rd, H, f, S, g, roll)
+    return H, f, S[:, :5], g[:, :5], roll
 
 
 @given(st.integers(0, 1000))

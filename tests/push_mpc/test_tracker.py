@@ -124,10 +124,11 @@ def test_a_blocked_way_ends_the_task():
 
 
 class Broken:
-    row_generation = True
+    def solve(self, qp):
+        return QpSolution(np.zeros(len(qp.f)), False, "broken")
 
-    def solve(self, H, f, G, b, low, high, active=None):
-        return QpSolution(np.zeros(len(f)), False, "broken")
+    def reset(self):
+        pass
 
 
 def test_failed_solves_fade_to_a_stop_and_are_reported():
@@ -168,15 +169,16 @@ def test_delay_is_made_good_by_the_commands_since():
 class Slow:
     """A solver that thinks for longer than it may."""
 
-    row_generation = True
-
     def __init__(self):
         self.pause = 0.0
         self.honest = DaqpBackend()
 
-    def solve(self, H, f, G, b, low, high, active=None):
+    def solve(self, qp):
         time.sleep(self.pause)
-        return self.honest.solve(H, f, G, b, low, high, active)
+        return self.honest.solve(qp)
+
+    def reset(self):
+        self.honest.reset()
 
 
 def test_late_solves_fade_to_a_stop_and_one_in_time_goes_on():

@@ -1,0 +1,178 @@
+"""The QP backends: against each other, against the conditions of optimality, and at the edges."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from push_model import CurvatureLimits, DifferentialDrive
+from push_mpc import (
+    ActiveSetBackend,
+    DaqpBackend,
+    LtvMpc,
+    MpcSettings,
+    OsqpBackend,
+    Qp,
+    Reference,
+    backend,
+)
+from push_mpc import active_set as kernel
+
+BACKENDS = {"active_set": ActiveSetBackend, "daqp": DaqpBackend, "osqp": lambda: OsqpBackend(1e-9)}
+SEEDS = st.integers(0, 10**6)
+
+
+def random_qp(seed, n=8, m=20):
+    """Feasible: z = 0 satisfies it."""
+    random = np.random.default_rng(seed)
+    root = random.normal(size=(n, n))
+    H, f = root @ root.T + 0.1 * np.eye(n), random.normal(size=n) * 20
+    G, b = random.normal(size=(m, n)), random.uniform(0.01, 1, m)
+    return Qp.dense(H, f, G, b, np.full(n, -1.0), np.full(n, 1.0))
+
+
+def assert_optimal(qp, z, tolerance=1e-6):
+    """Karush, Kuhn, Tucker: feasible, and -gradient in the cone of the tight normals."""
+    from scipy.optimize import nnls
+
+    G, b = qp.rows(qp.all_rows())
+    eye = np.eye(len(z))
+    normals, right = np.vstack([G, eye, -eye]), np.concatenate([b, qp.high, -qp.low])
+    room = right - normals @ z
+    assert room.min() > -tolerance
+    gradient = qp.H @ z + qp.f
+    if np.abs(gradient).max() > tolerance:
+        _, residual = nnls(normals[room < 1e-5].T, -gradient, maxiter=10000)
+        assert residual < 1e-4 * (1 + np.abs(gradient).max())
+
+
+@pytest.mark.parametrize("name", BACKENDS)
+def test_solution_meets_the_conditions_of_optimality(name):
+    for seed in range(25):
+        qp = random_qp(seed)
+        result = BACKENDS[name]().solve(qp)
+        assert result.solved, result.status
+        assert_optimal(qp, result.z, 1e-5 if name == "osqp" else 1e-7)
+
+
+@given(SEEDS, st.integers(1, 12), st.integers(0, 60))
+def test_active_set_is_optimal_whatever_the_size(seed, n, m):
+    qp = random_qp(seed, n, m)
+    result = ActiveSetBackend().solve(qp)
+    assert result.solved, result.status
+    assert_optimal(qp, result.z)
+
+
+@given(SEEDS, SEEDS)
+def test_start_from_any_working_set_gives_the_same_answer(seed, other):
+    """The guess may be of another programme altogether."""
+    qp, strange = random_qp(seed), random_qp(other)
+    warm = ActiveSetBackend()
+    warm.solve(strange)
+    assert warm.solve(qp).z == pytest.approx(ActiveSetBackend().solve(qp).z, abs=1e-8)
+
+
+def test_start_from_its_own_working_set_takes_one_iteration_a_constraint():
+    for seed in range(10):
+        qp, solver = random_qp(seed, 12, 40), ActiveSetBackend()
+        cold = int(solver.solve(qp).status.split()[-2])
+        count = solver._count
+        warm = int(solver.solve(qp).status.split()[-2])
+        assert count <= warm <= max(cold, count)
+
+
+@given(SEEDS)
+def test_repeated_and_dependent_rows_are_no_trouble(seed):
+    qp = random_qp(seed, 5, 10)
+    G, b = qp.rows(qp.all_rows())
+    many = np.vstack([G, G, 2.0 * G, G + G[::-1]])
+    right = np.concatenate([b, b, 2.0 * b, b + b[::-1]])
+    repeated = Qp.dense(qp.H, qp.f, many, right, qp.low, qp.high)
+    result = ActiveSetBackend().solve(repeated)
+    assert result.solved, result.status
+    assert result.z == pytest.approx(ActiveSetBackend().solve(qp).z, abs=1e-7)
+
+
+@pytest.mark.parametrize("name", ["active_set", "daqp"])
+def test_contradicting_rows_are_infeasible(name):
+    G, b = np.array([[1.0, 0.0], [-1.0, 0.0]]), np.array([-0.5, -0.5])
+    qp = Qp.dense(np.eye(2), np.ones(2), G, b, np.full(2, -1.0), np.full(2, 1.0))
+    assert not BACKENDS[name]().solve(qp).solved
+
+
+@pytest.mark.parametrize("where", ["H", "f", "G", "b"])
+def test_nan_is_not_solved_and_leaves_no_trace(where):
+    """FAULTS 4: the next good programme is solved as if nothing had been."""
+    qp, solver = random_qp(3), ActiveSetBackend()
+    G, b = qp.rows(qp.all_rows())
+    bad = {"H": qp.H.copy(), "f": qp.f.copy(), "G": G.copy(), "b": b.copy()}
+    bad[where].flat[0] = np.nan
+    result = solver.solve(Qp.dense(bad["H"], bad["f"], bad["G"], bad["b"], qp.low, qp.high))
+    assert not result.solved
+    assert np.array_equal(solver.solve(qp).z, ActiveSetBackend().solve(qp).z)
+
+
+def test_a_hessian_that_is_not_convex_is_refused():
+    qp = Qp.dense(-np.eye(2), np.ones(2), np.zeros((0, 2)), np.zeros(0), -np.ones(2), np.ones(2))
+    result = ActiveSetBackend().solve(qp)
+    assert not result.solved and "not convex" in result.status
+
+
+def test_an_unknown_backend_is_refused():
+    with pytest.raises(ValueError, match="unknown QP backend 'qpoases'"):
+        backend("qpoases")
+
+
+def test_rows_written_out_are_the_rows_of_the_outputs():
+    """The two readings of a condensed programme, with slacks and inputs of a real tick."""
+    qp = tick_programme(np.random.default_rng(5))
+    numbers = qp.all_rows()
+    G, b = qp.rows(numbers)
+    assert len(numbers) == 20 * (3 + 4 + 2 + 20)
+    for seed in range(5):
+        z = np.random.default_rng(seed).normal(size=len(qp.f))
+        assert b - G @ z == pytest.approx(qp.rooms(z)[numbers], abs=1e-12)
+
+
+def tick_programme(random):
+    p = 20
+    t = 0.1 * np.arange(p + 1)
+    reference = Reference(
+        np.column_stack([0.07 * t, 0 * t, 0 * t]), np.tile([0.07, 0.0, 0.0], (p + 1, 1))
+    )
+    circles = np.column_stack([random.uniform(0, 0.3, (20, 2)), np.full(20, 0.045)])
+    error = random.normal(size=5) * [0.01, 0.02, 0.2, 0.02, 0.2]
+    mpc = LtvMpc(MpcSettings(), DifferentialDrive(0.0205, 0.0265, 6.28))
+    return mpc.programme(error, reference, CurvatureLimits(-1.8, 1.8), circles)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_backends_agree_on_programmes_of_the_controller(seed):
+    """Twenty obstacles strewn over the way: most of them cannot be avoided."""
+    qp = tick_programme(np.random.default_rng(seed))
+    ours, theirs = ActiveSetBackend().solve(qp), DaqpBackend().solve(qp)
+    assert ours.solved and theirs.solved
+    assert_optimal(qp, ours.z)
+    cost = [0.5 * z @ qp.H @ z + qp.f @ z for z in (ours.z, theirs.z)]
+    assert cost[0] == pytest.approx(cost[1], rel=1e-5)
+
+
+def test_weights_choose_as_the_exact_steepest_edge_does():
+    """The kept weights n' J2 J2' n against their definition: same iterations as when recomputed."""
+    qp = tick_programme(np.random.default_rng(1))
+    n = len(qp.f)
+    JT, L = np.empty((n, n)), np.empty((n, n))
+    assert kernel._inverse_factor(qp.H, L, JT)
+    box, row = np.zeros(n), np.zeros(qp.bound.shape)
+    change = np.empty(qp.bound.shape)
+    zero_g, zero_bound = np.zeros(qp.g.shape), np.zeros(qp.bound.shape)
+    y, slack = np.empty(qp.g.shape), np.empty(qp.bound.shape[1])
+    for i in range(n):
+        shape = (qp.S, zero_g, qp.width, qp.normal, zero_bound, qp.family, y, slack, change)
+        kernel._rooms_of(JT[i], *shape)
+        kernel._weigh(1.0, JT[i], change, box, row)
+    inverse = np.linalg.inv(qp.H)
+    G, _ = qp.rows(qp.all_rows())
+    exact = np.einsum("ij,jk,ik->i", G, inverse, G)
+    assert row.ravel()[qp.all_rows()] == pytest.approx(exact, rel=1e-9)
+    assert box == pytest.approx(np.diag(inverse), rel=1e-9)
