@@ -11,6 +11,17 @@ from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalRespons
 from rclpy.node import Node
 
 
+class _Server(ActionServer):
+    """Goals are EXECUTING without a task: the events executor would poll one all the time."""
+
+    def notify_execute(self, goal_handle: Any, execute_callback: Any) -> None:
+        """Called by ``goal_handle.execute()``: the work is done by the owner, in callbacks."""
+
+    def deliver(self, goal_handle: Any, end: Callable[[Any], Any]) -> None:
+        """End the goal in a task that does not wait; ``end`` returns the result."""
+        super().notify_execute(goal_handle, end)
+
+
 class GoalServer:
     """An action server for one goal at a time.
 
@@ -35,11 +46,11 @@ class GoalServer:
         self._check, self._start, self._cancel = check, start, cancel
         self._preempted = preempted
         self._handle: Any = None
-        self._server = ActionServer(
+        self._server = _Server(
             node,
             action,
             name,
-            execute_callback=self._execute,
+            execute_callback=lambda handle: None,  # rclpy wants one; notify_execute is ours
             goal_callback=self._on_goal,
             handle_accepted_callback=self._on_accepted,
             cancel_callback=self._on_cancel,
@@ -63,6 +74,7 @@ class GoalServer:
         if self._handle is not None:
             self.finish(self._preempted(), success=False)
         self._handle = handle
+        handle.execute()
         self._start(handle.request)
 
     def _on_cancel(self, handle: Any) -> CancelResponse:
@@ -82,8 +94,7 @@ class GoalServer:
         handle, self._handle = self._handle, None
         if handle is None:
             return
-        # Executing is only the delivery of the result: the work is already done.
-        handle.execute(lambda h: self._deliver(h, result, success))
+        self._server.deliver(handle, lambda h: self._deliver(h, result, success))
 
     def _deliver(self, handle: Any, result: Any, success: bool) -> Any:
         if handle.is_cancel_requested:
@@ -93,9 +104,6 @@ class GoalServer:
         else:
             handle.abort()
         return result
-
-    def _execute(self, handle: Any) -> Any:
-        raise RuntimeError("goals are delivered by finish()")
 
 
 class GoalClient:
