@@ -45,9 +45,38 @@ class OccupancyGrid:
         _, first = np.unique(keys, axis=0, return_index=True)
         return points[np.sort(first)] * self.resolution + self.origin
 
+    def rectangles(self) -> Array:
+        """``(n, 4)`` x_min, x_max, y_min, y_max [m] of disjoint rectangles of occupied cells."""
+        left = self.occupied.copy()
+        found = []
+        for row, column in np.argwhere(left).tolist():
+            if not left[row, column]:
+                continue
+            across = left[row, column:]
+            gaps = np.flatnonzero(~across)
+            width = int(gaps[0]) if len(gaps) else across.shape[0]
+            full = left[row:, column : column + width].all(axis=1)
+            ends = np.flatnonzero(~full)
+            height = int(ends[0]) if len(ends) else full.shape[0]
+            left[row : row + height, column : column + width] = False
+            found.append((column, column + width, row, row + height))
+        corners = np.array(found, dtype=np.float64).reshape(-1, 4) * self.resolution
+        return corners + self.origin[[0, 0, 1, 1]]
 
-def rasterise(environment: EnvironmentSpec, border: int = 2) -> OccupancyGrid:
+
+@dataclass(frozen=True)
+class MapSpec:
+    """An environment given by a grid; occupied cells are walls."""
+
+    grid: OccupancyGrid
+    wall_height: float
+    wall_friction: float
+
+
+def rasterise(environment: EnvironmentSpec | MapSpec, border: int = 2) -> OccupancyGrid:
     """The grid of an environment; a cell is occupied when its centre is, the border always."""
+    if isinstance(environment, MapSpec):
+        return environment.grid
     r = environment.resolution
     columns = math.ceil(environment.size[0] / r - 1e-9) + 2 * border
     rows = math.ceil(environment.size[1] / r - 1e-9) + 2 * border

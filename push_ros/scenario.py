@@ -12,9 +12,10 @@ import numpy as np
 import yaml
 
 from push_model.arrays import Array
-from push_model.occupancy import OccupancyGrid, rasterise
+from push_model.occupancy import MapSpec, OccupancyGrid, rasterise
 from push_model.settings import SettingsError, from_mapping
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
+from push_ros.map_file import is_map, load_map
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class Scenario:
     """parameters: node name to a mapping of that node's settings; goal ``(3,)``; text: the YAML."""
 
     name: str
-    environment: EnvironmentSpec
+    environment: EnvironmentSpec | MapSpec
     robots: dict[str, tuple[RobotSpec, Array]]
     objects: dict[str, tuple[ObjectSpec, Array]]
     goal: Array | None
@@ -139,9 +140,7 @@ def scenario_from_mapping(
     for key in ("environment", "robots"):
         if key not in values:
             raise SettingsError(f"{where}: missing key '{key}'")
-    environment = _load(
-        EnvironmentSpec, "environments", values["environment"], f"{where}.environment", folder
-    )
+    environment = _environment(values["environment"], f"{where}.environment", folder)
     robots = _bodies(RobotSpec, "robots", values["robots"], f"{where}.robots", folder)
     objects = _bodies(
         ObjectSpec, "objects", values.get("objects") or {}, f"{where}.objects", folder
@@ -168,16 +167,23 @@ def scenario_from_mapping(
     )
 
 
-def _load(cls: type[Any], kind: str, value: Any, where: str, folder: Path | None) -> Any:
-    if isinstance(value, str):
-        path = Path(value)
-        if path.suffix in (".yaml", ".yml"):
-            if not path.is_absolute() and folder is not None:
-                path = folder / path
-        else:
-            path = find(kind, value)
-        value, where = read_yaml(path), str(path)
-    return from_mapping(cls, value, where)
+def _read(kind: str, value: Any, where: str, folder: Path | None) -> tuple[Any, str, Path | None]:
+    """The YAML that a value names or is, where it stands, and the folder of paths in it."""
+    if not isinstance(value, str):
+        return value, where, folder
+    path = Path(value)
+    if path.suffix not in (".yaml", ".yml"):
+        path = find(kind, value)
+    elif not path.is_absolute() and folder is not None:
+        path = folder / path
+    return read_yaml(path), str(path), path.parent
+
+
+def _environment(value: Any, where: str, folder: Path | None) -> EnvironmentSpec | MapSpec:
+    value, where, folder = _read("environments", value, where, folder)
+    if is_map(value):
+        return load_map(value, where, folder)
+    return from_mapping(EnvironmentSpec, value, where)
 
 
 def _bodies(
@@ -199,7 +205,7 @@ def _bodies(
         elif overrides:
             spec = {**spec, **overrides}
         result[str(name)] = (
-            _load(cls, kind, spec, here, folder),
+            from_mapping(cls, *_read(kind, spec, here, folder)[:2]),
             _pose(entry["start"], f"{here}.start"),
         )
     return result

@@ -4,13 +4,14 @@ One world is one PyBullet connection and belongs to one thread.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import pybullet as pb
 
 from push_model.arrays import Array
+from push_model.occupancy import MapSpec
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
 from sim_bridge.object_body import BODY_GROUP, FLOOR_GROUP, Feet, ObjectBody
 from sim_bridge.robot_body import BODY, RobotBody
@@ -38,7 +39,7 @@ class World:
 
     def __init__(
         self,
-        environment: EnvironmentSpec,
+        environment: EnvironmentSpec | MapSpec,
         robots: Mapping[str, tuple[RobotSpec, Array]],
         objects: Mapping[str, tuple[ObjectSpec, Array]],
         physics: PhysicsSettings | None = None,
@@ -96,13 +97,36 @@ class World:
         )
         return body
 
-    def _build_environment(self, environment: EnvironmentSpec) -> None:
+    def _build_environment(self, environment: EnvironmentSpec | MapSpec) -> None:
         plane = pb.createCollisionShape(pb.GEOM_PLANE, physicsClientId=self._client)
         self._floor = self._static(plane, 0.0, 0.0, 0.0, 0.0, 1.0)
         pb.setCollisionFilterGroupMask(
             self._floor, -1, FLOOR_GROUP, BODY_GROUP, physicsClientId=self._client
         )
         self._names[self._floor] = "floor"
+        if isinstance(environment, MapSpec):
+            x0, x1, y0, y1 = environment.grid.rectangles().T
+            boxes = np.column_stack([x0 + x1, y0 + y1, 2 * (x1 - x0), 2 * (y1 - y0), 0 * x0]) / 2
+            self._build_boxes([tuple(b) for b in boxes], environment)
+        else:
+            self._build_arena(environment)
+
+    def _build_boxes(
+        self,
+        boxes: Sequence[tuple[float, ...]],
+        environment: EnvironmentSpec | MapSpec,
+    ) -> None:
+        """Boxes of x, y, length, width, yaw, as high as walls are."""
+        h, mu = environment.wall_height, environment.wall_friction
+        for i, (x, y, length, width, yaw) in enumerate(boxes):
+            shape = pb.createCollisionShape(
+                pb.GEOM_BOX,
+                halfExtents=[length / 2.0, width / 2.0, h / 2.0],
+                physicsClientId=self._client,
+            )
+            self._names[self._static(shape, x, y, h / 2.0, yaw, mu)] = f"wall{i}"
+
+    def _build_arena(self, environment: EnvironmentSpec) -> None:
         h, mu = environment.wall_height, environment.wall_friction
         sx, sy = environment.size
         thick = 0.1
@@ -111,14 +135,10 @@ class World:
             (0.0, -(sy + thick) / 2.0, sx + 2 * thick, thick, 0.0),
             ((sx + thick) / 2.0, 0.0, thick, sy, 0.0),
             (-(sx + thick) / 2.0, 0.0, thick, sy, 0.0),
-        ] + [(*b.centre, *b.size, b.yaw) for b in environment.boxes]
-        for i, (x, y, length, width, yaw) in enumerate(walls):
-            shape = pb.createCollisionShape(
-                pb.GEOM_BOX,
-                halfExtents=[length / 2.0, width / 2.0, h / 2.0],
-                physicsClientId=self._client,
-            )
-            self._names[self._static(shape, x, y, h / 2.0, yaw, mu)] = f"wall{i}"
+        ]
+        self._build_boxes(
+            walls + [(*b.centre, *b.size, b.yaw) for b in environment.boxes], environment
+        )
         for i, circle in enumerate(environment.circles):
             shape = pb.createCollisionShape(
                 pb.GEOM_CYLINDER, radius=circle.radius, height=h, physicsClientId=self._client

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from push_model import se2, uniform_pressure_radius
+from push_model.occupancy import MapSpec, OccupancyGrid
 from push_model.specs import EnvironmentSpec, ObjectSpec
 from sim_bridge.settings import PhysicsSettings
 from sim_bridge.world import World
@@ -153,3 +154,15 @@ def test_convex_and_concave_objects_stand_and_slide(robot):
             w.step(40)
             slowed = (first - w.velocity("b")[0]) / 0.04
             assert slowed == pytest.approx(0.3 * 9.81, rel=0.02), shape
+
+
+def test_occupied_cells_of_a_map_are_walls(robot):
+    occupied = np.zeros((40, 60), dtype=bool)
+    occupied[:, 45:50] = True  # x from 0.45 to 0.50
+    room = MapSpec(OccupancyGrid(occupied, 0.02, np.array([-0.45, -0.4])), 0.1, 0.3)
+    with World(room, {"r": (robot, np.zeros(3))}, {}) as w:
+        w.command("r", 0.1, 0.0)
+        w.step(6000)
+        x, y, _ = w.poses()["r"]
+        assert x + robot.bumper.distance == pytest.approx(0.45, abs=0.004)
+        assert abs(y) < 0.01
