@@ -11,20 +11,24 @@ from nav_msgs.msg import OccupancyGrid
 from rclpy.signals import SignalHandlerOptions
 
 from push_msgs.msg import NamedPoses, SupervisorState
-from push_ros.conversions import pose_stamped_to_ros
+from push_ros.conversions import pose_stamped_to_ros, time_from_ros
 from push_ros.process import Spinner, prepare_environment
 from push_ros.qos import COMMAND, LATCHED, STREAM
 
 
 class Monitor:
-    """Use it as a context manager; it owns its ROS context."""
+    """Use it as a context manager; it owns its ROS context.
+
+    state: newest of the supervisor. position: (x, y) [m] of the object. Both None until heard.
+    """
 
     def __enter__(self) -> "Monitor":
         prepare_environment()
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         self._node = rclpy.create_node("monitor")
-        self._state: SupervisorState | None = None
-        self._position: tuple[float, float] | None = None
+        self.state: SupervisorState | None = None
+        self.position: tuple[float, float] | None = None
+        self.stamp = 0.0  # [s] of the newest poses
         self._map = False
         self._news = 0
         self._goal: tuple[float, float, float] | None = None
@@ -42,7 +46,7 @@ class Monitor:
         rclpy.try_shutdown()
 
     def _on_state(self, message: SupervisorState) -> None:
-        self._state = message
+        self.state = message
         self._news += 1
         if self._goal is not None:
             print(f"  {message.state_name.lower():12s} {message.reason}", flush=True)
@@ -51,18 +55,23 @@ class Monitor:
         self._map = True
 
     def _on_poses(self, message: NamedPoses) -> None:
+        self.stamp = time_from_ros(message.header.stamp)
         if len(message.poses) >= 2:
             p = message.poses[-1].pose.position
-            self._position = (p.x, p.y)
+            self.position = (p.x, p.y)
+
+    def wait(self, limit: float, condition: Callable[[], bool]) -> bool:
+        """Spin until the condition holds; whether it did within limit [s] of wall time."""
+        return self._spinner.until(condition, limit)
 
     def connect(self, limit: float, alive: Callable[[], bool] = lambda: True) -> bool:
         """Wait for supervisor, map and poses; False after limit [s] or when not alive."""
         end = time.monotonic() + limit
         while time.monotonic() < end and alive():
             ready = (
-                self._state is not None
+                self.state is not None
                 and self._map
-                and self._position is not None
+                and self.position is not None
                 and self._publisher.get_subscription_count() > 0
                 and self._node.count_publishers("/supervisor/state") > 0
             )
@@ -84,12 +93,12 @@ class Monitor:
         shown = 0.0
         while time.monotonic() < end and alive():
             self._spinner.once(0.1)
-            state = self._state
+            state = self.state
             if self._news and state is not None and state.state == SupervisorState.IDLE:
                 return 0 if state.error_code == 0 else 1
-            if time.monotonic() - shown > 2.0 and self._position is not None:
+            if time.monotonic() - shown > 2.0 and self.position is not None:
                 shown = time.monotonic()
-                gap = np.hypot(self._position[0] - self._goal[0], self._position[1] - self._goal[1])
+                gap = np.hypot(self.position[0] - self._goal[0], self.position[1] - self._goal[1])
                 print(f"  {gap:6.3f} m to go", flush=True)
         print(
             "error: the job did not end in time" if alive() else "error: a node died",

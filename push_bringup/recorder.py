@@ -11,7 +11,7 @@ from nav_msgs.msg import OccupancyGrid
 from nav_msgs.msg import Path as PathMessage
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
-from std_msgs.msg import String
+from std_msgs.msg import Header, String
 from visualization_msgs.msg import MarkerArray
 
 from push_bringup.bag import BagWriter
@@ -58,6 +58,7 @@ def topics(scenario: Scenario) -> dict[str, tuple[Any, Any]]:
     }
     for robot in scenario.robots:
         result[f"/{robot}/cmd_vel"] = (TwistStamped, COMMAND)
+        result[f"/{robot}/heartbeat"] = (Header, STREAM)
     return result
 
 

@@ -13,6 +13,7 @@ from push_model.limit_surface import (
     PressureLimitSurface,
     uniform_pressure_radius,
 )
+from push_model.push_segment import PushSegment
 from push_model.settings import SettingsError, from_mapping
 from push_model.shapes import Shape, Side, ellipse, flower, polygon, rectangle, shape_from_mapping
 from push_model.stable_push import (
@@ -31,6 +32,7 @@ __all__ = [
     "EllipsoidLimitSurface",
     "LimitSurface",
     "PressureLimitSurface",
+    "PushSegment",
     "PusherContact",
     "SettingsError",
     "Shape",

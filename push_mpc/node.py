@@ -11,7 +11,6 @@ from std_msgs.msg import Header
 
 from push_model.kinematics import unicycle_step
 from push_model.settings import SettingsError
-from push_model.stable_push import CurvatureLimits
 from push_mpc import (
     LtvMpc,
     MpcSettings,
@@ -26,6 +25,7 @@ from push_msgs.msg import ControllerStatus, NamedPoses
 from push_ros.actions import GoalServer
 from push_ros.conversions import (
     circles_from_ros,
+    limits_from_ros,
     time_from_ros,
     trajectory_from_ros,
     twist_to_ros,
@@ -67,7 +67,6 @@ class ControllerNode(Node):
             "controller.tracker",
             self._apply_tracker,
         )
-        self._tracker: TrajectoryTracker | None = None
         self._rebuild()
         self._poses = PoseTracker(
             declare_settings(
@@ -114,7 +113,7 @@ class ControllerNode(Node):
         )
 
     def _busy(self) -> None:
-        if self._tracker is not None and self._tracker.active:
+        if self.tracker.active:
             raise SettingsError("the controller is busy; change its parameters when it is idle")
 
     def _apply_mpc(self, settings: MpcSettings) -> None:
@@ -131,7 +130,6 @@ class ControllerNode(Node):
         self.tracker = TrajectoryTracker(
             self._tracker_settings, LtvMpc(self._mpc_settings, self._drive)
         )
-        self._tracker = self.tracker
         self.tracker.warm_up()
 
     def _parse(self, request: Any) -> tuple[Task, float]:
@@ -142,13 +140,9 @@ class ControllerNode(Node):
         finite(tolerances, "a tolerance")
         push = None
         if request.mode == FollowTrajectory.Goal.PUSH:
-            low, high = request.curvature_min, request.curvature_max
-            finite((low, high), "a curvature limit")
-            if not low < 0.0 < high:
-                raise InvalidMessage(f"curvature limits must enclose 0, got [{low}, {high}]")
             if request.object not in self._scenario.objects:
                 raise InvalidMessage(f"unknown object '{request.object}'")
-            push = Push(planar_pose(request.contact, "the contact"), CurvatureLimits(low, high))
+            push = Push(planar_pose(request.contact, "the contact"), limits_from_ros(request))
         elif request.mode != FollowTrajectory.Goal.MOVE:
             raise InvalidMessage(f"unknown mode {request.mode}")
         if min(tolerances) < 0.0:

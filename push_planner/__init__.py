@@ -8,7 +8,6 @@ from push_planner.planner import (
     Progress,
     PushPlan,
     PushPlanner,
-    PushSegment,
 )
 from push_planner.preemptive import preemptive_pushes
 from push_planner.push_curve import PushCurve, shortest_push_curve
@@ -28,7 +27,6 @@ __all__ = [
     "PushPlan",
     "PushPlanner",
     "PushScene",
-    "PushSegment",
     "PushSide",
     "RobotPathError",
     "plan_robot_path",

@@ -10,13 +10,13 @@ import numpy as np
 from push_model import se2
 from push_model.arrays import Array
 from push_model.occupancy import OccupancyGrid
+from push_model.push_segment import PushSegment
 from push_model.specs import ObjectSpec, RobotSpec
-from push_model.trajectory import Trajectory, along_curve
+from push_model.trajectory import along_curve
 from push_planner.distance_field import DistanceField
 from push_planner.guide_path import GuidePath, guide_paths
-from push_planner.push_curve import PushCurve
 from push_planner.push_search import PushSearch, PushStep, SearchStatistics
-from push_planner.scene import PushScene, PushSide
+from push_planner.scene import PushScene
 from push_planner.settings import PlannerSettings
 
 
@@ -38,22 +38,6 @@ class PlanningFailed(Exception):
     def __init__(self, code: PlanError, message: str) -> None:
         super().__init__(message)
         self.code = code
-
-
-@dataclass(frozen=True)
-class PushSegment:
-    """A push that is ready to be executed.
-
-    standoff: robot pose ``(3,)`` where its approach begins; clearance [m].
-    """
-
-    side: PushSide
-    curve: PushCurve
-    object_start: Array
-    object_end: Array
-    standoff: Array
-    clearance: float
-    trajectory: Trajectory
 
 
 @dataclass(frozen=True)
@@ -85,7 +69,7 @@ class PushPlan:
     @property
     def length(self) -> float:
         """[m] pushed in all."""
-        return sum(s.curve.length for s in self.segments)
+        return sum(s.length for s in self.segments)
 
 
 @dataclass(frozen=True)
@@ -217,12 +201,18 @@ class PushPlanner:
             self.settings.push_speed,
             self.settings.push_acceleration,
         )
+        curve = step.curve
         return PushSegment(
-            step.side,
-            step.curve,
+            step.side.index,
             step.object_start,
             step.object_end,
-            self.scene.standoff(step.curve.start),
+            curve.start,
+            curve.end,
+            self.scene.standoff(curve.start),
+            curve.k_start,
+            curve.k_end,
+            curve.length,
+            step.side.nominal,
             step.clearance,
             trajectory,
         )

@@ -9,7 +9,8 @@ import numpy as np
 from push_model import se2
 from push_model.arrays import Array
 from push_model.kinematics import unicycle_step
-from push_planner.planner import PushPlanner, PushSegment
+from push_model.push_segment import PushSegment
+from push_planner.planner import PushPlanner
 from push_planner.push_curve import shortest_push_curve
 from push_planner.push_search import PushStep
 

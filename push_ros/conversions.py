@@ -13,13 +13,15 @@ from nav_msgs.msg import Path
 from push_model import se2
 from push_model.arrays import Array
 from push_model.occupancy import OccupancyGrid
+from push_model.push_segment import PushSegment
+from push_model.stable_push import CurvatureLimits
 from push_model.trajectory import Trajectory
 from push_msgs.msg import Circle
 from push_msgs.msg import PlanStatistics as StatisticsMessage
 from push_msgs.msg import PushPlan as PlanMessage
 from push_msgs.msg import PushSegment as SegmentMessage
 from push_msgs.msg import Trajectory as TrajectoryMessage
-from push_ros.validation import FRAME, InvalidMessage, finite
+from push_ros.validation import FRAME, InvalidMessage, finite, planar_pose
 
 
 def time_to_ros(seconds: float) -> Time:
@@ -157,22 +159,50 @@ def plan_to_ros(plan: Any, robot: str, item: str, seconds: float) -> PlanMessage
     return message
 
 
-def segment_to_ros(segment: Any) -> SegmentMessage:
-    """push_planner.PushSegment to its message."""
+def segment_to_ros(segment: PushSegment) -> SegmentMessage:
+    """A push to its message."""
     return SegmentMessage(
-        side=segment.side.index,
+        side=segment.side,
         object_start=pose_to_ros(segment.object_start),
         object_end=pose_to_ros(segment.object_end),
-        robot_start=pose_to_ros(segment.curve.start),
-        robot_end=pose_to_ros(segment.curve.end),
+        robot_start=pose_to_ros(segment.robot_start),
+        robot_end=pose_to_ros(segment.robot_end),
         robot_standoff=pose_to_ros(segment.standoff),
-        k_start=float(segment.curve.k_start),
-        k_end=float(segment.curve.k_end),
-        length=float(segment.curve.length),
-        curvature_min=float(segment.side.nominal.minimum),
-        curvature_max=float(segment.side.nominal.maximum),
+        k_start=float(segment.k_start),
+        k_end=float(segment.k_end),
+        length=float(segment.length),
+        curvature_min=float(segment.limits.minimum),
+        curvature_max=float(segment.limits.maximum),
+        clearance=float(segment.clearance),
         trajectory=trajectory_to_ros(segment.trajectory),
     )
+
+
+def segment_from_ros(message: SegmentMessage) -> PushSegment:
+    """A push from its message; raises InvalidMessage."""
+    return PushSegment(
+        int(message.side),
+        planar_pose(message.object_start, "object_start"),
+        planar_pose(message.object_end, "object_end"),
+        planar_pose(message.robot_start, "robot_start"),
+        planar_pose(message.robot_end, "robot_end"),
+        planar_pose(message.robot_standoff, "robot_standoff"),
+        message.k_start,
+        message.k_end,
+        message.length,
+        limits_from_ros(message),
+        message.clearance,
+        trajectory_from_ros(message.trajectory),
+    )
+
+
+def limits_from_ros(message: Any) -> CurvatureLimits:
+    """curvature_min and curvature_max of a message; raises InvalidMessage."""
+    low, high = message.curvature_min, message.curvature_max
+    finite((low, high), "a curvature limit")
+    if not low < 0.0 < high:
+        raise InvalidMessage(f"curvature limits must enclose 0, got [{low}, {high}]")
+    return CurvatureLimits(low, high)
 
 
 def path_to_ros(trajectories: list[Trajectory], seconds: float) -> Path:

@@ -17,10 +17,11 @@ from std_srvs.srv import Trigger
 from push_model import se2
 from push_model.arrays import Array
 from push_model.occupancy import OccupancyGrid as Grid
+from push_model.push_segment import PushSegment
 from push_model.settings import SettingsError
-from push_model.trajectory import Trajectory, line
+from push_model.trajectory import Trajectory
 from push_msgs.action import FollowTrajectory, MoveObject, PlanPush
-from push_msgs.msg import NamedPoses, SupervisorState
+from push_msgs.msg import NamedPoses, PushPlan, SupervisorState
 from push_msgs.srv import PlanRobotPath
 from push_planner import PlannerSettings, PushPlanner, preemptive_pushes
 from push_ros.actions import GoalClient, GoalServer
@@ -29,8 +30,9 @@ from push_ros.conversions import (
     grid_from_ros,
     pose_stamped_to_ros,
     pose_to_ros,
-    segment_to_ros,
+    segment_from_ros,
     time_from_ros,
+    trajectory_from_ros,
     trajectory_to_ros,
 )
 from push_ros.diagnostics import Diagnostics
@@ -39,7 +41,15 @@ from push_ros.pose_tracker import PoseTracker, PoseTrackerSettings, Stamp
 from push_ros.qos import COMMAND, LATCHED, STREAM
 from push_ros.scenario import Scenario, load_scenario
 from push_ros.validation import InvalidMessage, planar_pose, stamped_pose
-from push_supervisor import Command, Event, JobError, Machine, State, SupervisorSettings
+from push_supervisor import (
+    Command,
+    Event,
+    JobError,
+    Machine,
+    State,
+    SupervisorSettings,
+    motions,
+)
 
 _PLAN_ERRORS = {
     PlanPush.Result.INVALID_GOAL: JobError.INVALID_GOAL,
@@ -50,7 +60,6 @@ _PLAN_ERRORS = {
 }
 _RETRY_CODES = (PlanPush.Result.NO_PUSH_SEQUENCE,)
 _POSE_PERIOD = 0.045  # [s] of the frames that are looked at
-_OBSTACLE_SPACING = 0.04  # [m] between the round obstacles that stand for a wall
 
 
 class SupervisorNode(Node):
@@ -82,6 +91,7 @@ class SupervisorNode(Node):
         self._object_radius = self._object_spec.geometry.circumradius
         self.machine = Machine(self.settings, self._at_goal)
         self._obstacles = np.zeros((0, 3))
+        self._planner: PushPlanner | None = None  # for pre-emptive pushes; made when first needed
         self._grid: Grid | None = None
         self._ticks = 0
         self._seed = 0
@@ -157,10 +167,9 @@ class SupervisorNode(Node):
         except InvalidMessage as error:
             self._diagnostics.refuse("/map", str(error))
             return
-        self._grid = grid
-        points = grid.boundary_points(_OBSTACLE_SPACING)
-        radius = self._robot_spec.body_radius + self.settings.obstacle_margin
-        self._obstacles = np.column_stack([points, np.full(len(points), radius)])
+        self._grid, self._planner = grid, None
+        margin = self.settings.obstacle_margin
+        self._obstacles = motions.wall_circles(grid, self._robot_spec.body_radius, margin)
 
     def _on_goal_pose(self, message: PoseStamped) -> None:
         if self._job.active:
@@ -261,9 +270,7 @@ class SupervisorNode(Node):
         item = self._poses.pose(self.object)
         if item is None:
             return
-        planned = planar_pose(machine.segment.object_start)
-        local = se2.between(planned, item)
-        way, turn = float(np.hypot(local[0], local[1])), abs(float(local[2]))
+        way, turn = motions.displacement(machine.segment, item)
         off = way > self.settings.displacement or turn > self.settings.displacement_turn
         self._displaced = self._displaced + 1 if off else 0
         if self._displaced >= 3:
@@ -358,9 +365,8 @@ class SupervisorNode(Node):
 
     def _send(self, command: Command, arguments: dict[str, Any], robot: Array, item: Array) -> None:
         if command is Command.PLAN:
-            offer = arguments["start"]
-            start = item if offer is None else planar_pose(offer.object_end)
-            self._request_plan(start, arguments["goal"])
+            offer: PushSegment | None = arguments["start"]
+            self._request_plan(item if offer is None else offer.object_end, arguments["goal"])
         elif command is Command.OFFER:
             self._offer(item, arguments["goal"])
         elif command is Command.PATH:
@@ -369,28 +375,14 @@ class SupervisorNode(Node):
             margin = self.settings.obstacle_margin
             reach = self._object_radius + self._robot_spec.body_radius + margin
             circles = np.vstack([self._obstacles, [[item[0], item[1], reach]]])
-            self._follow(arguments["trajectory"], circles)
+            self._move(arguments["trajectory"], circles)
         elif command is Command.FOLLOW_APPROACH:
-            contact = self._contact_pose(item, arguments["segment"])
-            ahead = float(se2.between(robot, contact)[0])
-            begin = se2.compose(contact, np.array([-ahead, 0.0, 0.0]))
-            self._follow(trajectory_to_ros(self._straight(begin, ahead)), None)
+            way = motions.approach(arguments["segment"], robot, item, self.settings)
+            self._move(way, np.zeros((0, 3)))
         elif command is Command.FOLLOW_PUSH:
-            self._follow_push(arguments["segment"])
+            self._push(arguments["segment"])
         else:
-            back = self._straight(robot, -self.settings.detach_distance)
-            self._follow(trajectory_to_ros(back), self._obstacles)
-
-    def _straight(self, start: Array, distance: float) -> Trajectory:
-        return line(start, distance, self.settings.approach_speed, self.settings.acceleration)
-
-    def _contact_pose(self, item: Array, segment: Any) -> Array:
-        """Where the robot touches the pushed side, the object being at ``item`` ``(3,)``."""
-        grasp = self._grasp(segment)
-        return se2.compose(item, se2.inverse(grasp))
-
-    def _grasp(self, segment: Any) -> Array:
-        return se2.between(planar_pose(segment.robot_start), planar_pose(segment.object_start))
+            self._move(motions.retreat(robot, self.settings), self._obstacles)
 
     def _request_plan(self, start: Array, goal: Array) -> None:
         now = self._poses.stamp
@@ -410,7 +402,7 @@ class SupervisorNode(Node):
                     retry=False,
                 )
             elif result.error_code == PlanPush.Result.NONE:
-                self._fire(Event.PLANNED, segments=list(result.plan.segments))
+                self._take_plan(result.plan)
             else:
                 code = _PLAN_ERRORS.get(result.error_code, JobError.PLANNING_FAILED)
                 self._fire(
@@ -422,21 +414,34 @@ class SupervisorNode(Node):
 
         self._plan_client.send(request, done)
 
+    def _take_plan(self, plan: PushPlan) -> None:
+        try:
+            segments = [segment_from_ros(s) for s in plan.segments]
+        except InvalidMessage as error:
+            self._fire(
+                Event.PLAN_FAILED,
+                code=JobError.PLANNING_FAILED,
+                message=f"the plan is not valid: {error}",
+                retry=False,
+            )
+            return
+        self._fire(Event.PLANNED, segments=segments)
+
     def _offer(self, item: Array, goal: Array) -> None:
         if self._grid is None:
             self._fire(Event.OFFERS, segments=[])
             return
+        if self._planner is None:
+            self._planner = PushPlanner(
+                self._planner_settings, self._grid, self._robot_spec, self._object_spec
+            )
         self._seed += 1
-        planner = PushPlanner(
-            self._planner_settings, self._grid, self._robot_spec, self._object_spec
-        )
         seed = self._planner_settings.seed + self._seed
-        found = preemptive_pushes(planner, item, goal, seed)
-        self._fire(Event.OFFERS, segments=[segment_to_ros(s) for s in found])
+        found = preemptive_pushes(self._planner, item, goal, seed)
+        self._fire(Event.OFFERS, segments=found)
 
-    def _request_path(self, robot: Array, item: Array, segment: Any) -> None:
-        contact = self._contact_pose(item, segment)
-        standoff = se2.compose(contact, np.array([-self._planner_settings.standoff, 0.0, 0.0]))
+    def _request_path(self, robot: Array, item: Array, segment: PushSegment) -> None:
+        standoff = motions.standoff(segment, item, self._planner_settings.standoff)
         reach = self._object_radius + self._robot_spec.footprint_radius
         request = PlanRobotPath.Request(
             start=pose_to_ros(robot),
@@ -450,43 +455,40 @@ class SupervisorNode(Node):
             if token != self._path_token:
                 return
             answer = future.result()
-            if answer is not None and answer.error_code == PlanRobotPath.Response.NONE:
-                self._fire(Event.PATH, trajectory=answer.trajectory)
-            else:
+            if answer is None or answer.error_code != PlanRobotPath.Response.NONE:
                 text = "no answer" if answer is None else answer.message
                 self._fire(Event.PATH_FAILED, message=text)
+                return
+            try:
+                trajectory = trajectory_from_ros(answer.trajectory)
+            except InvalidMessage as error:
+                self._fire(Event.PATH_FAILED, message=str(error))
+                return
+            self._fire(Event.PATH, trajectory=trajectory)
 
         self._path_client.call_async(request).add_done_callback(done)
 
-    def _follow(self, trajectory: Any, circles: Array | None) -> None:
+    def _move(self, trajectory: Trajectory, circles: Array) -> None:
         goal = FollowTrajectory.Goal(
             mode=FollowTrajectory.Goal.MOVE,
-            trajectory=trajectory,
-            obstacles=[] if circles is None else circles_to_ros(self._near(circles, trajectory)),
+            trajectory=trajectory_to_ros(trajectory),
+            obstacles=circles_to_ros(motions.near(circles, trajectory)),
             heartbeat_timeout=self.settings.heartbeat_timeout,
         )
         self._send_follow(goal)
 
-    def _follow_push(self, segment: Any) -> None:
+    def _push(self, segment: PushSegment) -> None:
         goal = FollowTrajectory.Goal(
             mode=FollowTrajectory.Goal.PUSH,
             object=self.object,
-            trajectory=segment.trajectory,
-            contact=pose_to_ros(self._grasp(segment)),
-            curvature_min=segment.curvature_min,
-            curvature_max=segment.curvature_max,
-            obstacles=circles_to_ros(self._near(self._obstacles, segment.trajectory)),
+            trajectory=trajectory_to_ros(segment.trajectory),
+            contact=pose_to_ros(segment.grasp),
+            curvature_min=segment.limits.minimum,
+            curvature_max=segment.limits.maximum,
+            obstacles=circles_to_ros(motions.near(self._obstacles, segment.trajectory)),
             heartbeat_timeout=self.settings.heartbeat_timeout,
         )
         self._send_follow(goal)
-
-    def _near(self, circles: Array, trajectory: Any) -> Array:
-        """The circles within reach of a trajectory message."""
-        path = np.column_stack([trajectory.x, trajectory.y])[::5]
-        gap = np.hypot(
-            circles[:, None, 0] - path[None, :, 0], circles[:, None, 1] - path[None, :, 1]
-        ).min(axis=1)
-        return circles[gap < 0.4 + circles[:, 2]]
 
     def _send_follow(self, goal: Any) -> None:
         def done(result: Any) -> None:

@@ -47,14 +47,17 @@ def test_plan_is_continuous_stable_and_free(plan, planner, scenario, box):
     for before, after in zip(plan.segments, plan.segments[1:], strict=False):
         assert before.object_end == pytest.approx(after.object_start)
     for segment in plan.segments:
-        _, _, kappa = segment.curve.sample(2000)
-        assert kappa.max() <= segment.side.trusted.maximum + 1e-3
-        assert kappa.min() >= segment.side.trusted.minimum - 1e-3
+        side = planner.scene.sides[segment.side]
+        assert segment.grasp == pytest.approx(side.grasp)
+        assert segment.limits == side.nominal
+        v, omega = segment.trajectory.twist[1:-1].T
+        assert (omega <= (side.trusted.maximum + 1e-3) * v).all()
+        assert (omega >= (side.trusted.minimum - 1e-3) * v).all()
         poses = segment.trajectory.pose
-        assert se2.compose(poses[0], segment.side.grasp)[:2] == pytest.approx(START[:2], abs=1e-6)
+        assert se2.compose(poses[0], side.grasp)[:2] == pytest.approx(START[:2], abs=1e-6)
         # independent of the planner's own check: no cell under the object's corners or the robot
         for pose in poses:
-            item = se2.compose(pose, segment.side.grasp)
+            item = se2.compose(pose, side.grasp)
             for x, y in [*se2.transform(item, box.geometry.outline), pose[:2]]:
                 column, row = ((np.array([x, y]) - exact.origin) / exact.resolution).astype(int)
                 assert not exact.occupied[row, column]

@@ -8,7 +8,7 @@ from geometry_msgs.msg import Pose, PoseStamped, Quaternion
 from hypothesis import given
 from hypothesis import strategies as st
 
-from push_model import line
+from push_model import CurvatureLimits, PushSegment, line
 from push_ros import conversions as c
 from push_ros.validation import InvalidMessage, planar_pose, stamped_pose
 
@@ -33,6 +33,38 @@ def test_trajectory_round_trip():
     back = c.trajectory_from_ros(c.trajectory_to_ros(t))
     for name in ("time", "pose", "twist"):
         assert np.array_equal(getattr(t, name), getattr(back, name))
+
+
+def segment():
+    way = line(np.array([1.0, 2.0, 0.5]), 0.3, 0.1, 0.1)
+    first, last = way.pose[0], way.pose[-1]
+    limits = CurvatureLimits(-1.5, 2.0)
+    item, after = first + [0.1, 0.0, 0.0], last + [0.1, 0.0, 0.0]
+    return PushSegment(3, item, after, first, last, first, 0.3, 0.4, 0.3, limits, 0.02, way)
+
+
+def test_segment_round_trip():
+    there = segment()
+    back = c.segment_from_ros(c.segment_to_ros(there))
+    for name, value in vars(there).items():
+        if isinstance(value, np.ndarray):
+            assert getattr(back, name) == pytest.approx(value, abs=1e-9)
+        elif name != "trajectory":
+            assert getattr(back, name) == value
+    assert np.array_equal(back.trajectory.pose, there.trajectory.pose)
+
+
+@pytest.mark.parametrize("change", ["limits", "pose", "trajectory"])
+def test_broken_segments_are_refused(change):
+    message = c.segment_to_ros(segment())
+    if change == "limits":
+        message.curvature_min = 0.5
+    elif change == "pose":
+        message.object_end.position.x = math.nan
+    else:
+        message.trajectory.x = message.trajectory.x[:-1]
+    with pytest.raises(InvalidMessage):
+        c.segment_from_ros(message)
 
 
 def test_grid_round_trip(scenario):

@@ -26,11 +26,23 @@ def alive(group):
     return [c for c in group if c.process is not None and c.process.poll() is None]
 
 
-def wait(monitor, condition, limit):
-    end = time.monotonic() + limit
-    while time.monotonic() < end and not condition():
-        monitor._spinner.once(0.05)
-    return condition()
+def standstill(bag, sign):
+    """Sim time [s] that the bag covers after the last ``sign``, and the robot's way [m] from 0.4 s
+    after it on, both by the ground truth."""
+    truth, last = [], 0.0
+    for record in read_bag(bag, {sign, "/ground_truth/poses"}):
+        header = record.message if record.topic == "/epuck1/heartbeat" else record.message.header
+        stamp = header.stamp.sec + 1e-9 * header.stamp.nanosec
+        if record.topic == sign:
+            last = max(last, stamp)
+        else:
+            (pose,) = [p.pose for p in record.message.poses if p.name == "epuck1"]
+            truth.append((stamp, pose.position.x, pose.position.y))
+    table = np.array(truth)
+    moving = table[(table[:, 0] > last - 0.5) & (table[:, 0] <= last)]
+    assert np.hypot(*(moving[-1] - moving[0])[1:]) > 0.01, "it was to be killed on the move"
+    rest = table[table[:, 0] > last + 0.4]
+    return table[-1, 0] - last, float(np.hypot(*np.ptp(rest[:, 1:], axis=0)))
 
 
 @pytest.mark.parametrize(
@@ -47,28 +59,27 @@ def test_killed_node(domain, victim, respawn, tmp_path):
         with Monitor() as monitor:
             assert monitor.connect(40.0, lambda: not launcher.check())
             monitor.send_goal((0.1, 0.04, 0.1))
-            assert wait(monitor, lambda: monitor._position[0] > -0.35, 40.0)
+            assert monitor.wait(40.0, lambda: monitor.position[0] > -0.35)
             (child,) = [c for c in launcher.children if c.name == victim]
             child.process.send_signal(signal.SIGKILL)
-            end = time.monotonic() + 2.0
-            while not said and time.monotonic() < end:
-                launcher.check()
-                time.sleep(0.02)
+            killed = monitor.stamp
+            assert monitor.wait(2.0, lambda: bool(launcher.check()) or bool(said))
             assert any(f"{victim} died (signal 9)" in text for text in said)
             if not respawn:
-                wait(monitor, lambda: False, 0.5)
-                before = monitor._position
-                wait(monitor, lambda: False, 0.7)
-                assert np.hypot(*np.subtract(monitor._position, before)) < 2e-4
+                assert monitor.wait(20.0, lambda: monitor.stamp > killed + 2.0)
             else:
                 code = monitor.follow(90.0, lambda: launcher.check() is not None)
-                assert code == 0, monitor._state.reason
-                assert np.hypot(monitor._position[0] - 0.1, monitor._position[1] - 0.04) < 0.02
+                assert code == 0, monitor.state.reason
+                assert np.hypot(monitor.position[0] - 0.1, monitor.position[1] - 0.04) < 0.02
     finally:
         children = list(launcher.children)
         started = time.monotonic()
         launcher.stop()
     assert time.monotonic() - started < 5.0 and not alive(children)
+    if not respawn:
+        sign = "/epuck1/cmd_vel" if victim == "controller" else "/epuck1/heartbeat"
+        covered, way = standstill(tmp_path / "bag", sign)
+        assert covered > 1.5 and way < 1e-3  # it rocks by 0.2 mm
     topics = {r.topic for r in read_bag(tmp_path / "bag")}
     assert {"/poses", "/epuck1/cmd_vel", "/supervisor/state"} <= topics
 
