@@ -114,17 +114,19 @@ def _goal(arguments: argparse.Namespace) -> int:
 def _demo(arguments: argparse.Namespace) -> int:
     from push_bringup.launcher import Launcher, single_robot
     from push_bringup.monitor import Monitor
-    from push_bringup.report import write_report
+    from push_bringup.report import PRODUCTS, write_report
     from push_ros.scenario import load_scenario
 
     scenario = load_scenario(arguments.scenario)
-    out = Path(arguments.out)
-    if out.exists():
-        shutil.rmtree(out)
-    out.mkdir(parents=True)
     if scenario.goal is None:
         print(f"error: scenario '{scenario.name}' has no goal", file=sys.stderr)
         return 2
+    out = Path(arguments.out)
+    out.mkdir(parents=True, exist_ok=True)
+    for name in PRODUCTS:
+        (out / name).unlink(missing_ok=True)
+    if (out / "bag").exists():
+        shutil.rmtree(out / "bag")
     extra = {"bridge": ["--ros", "-p", f"real_time_factor:={arguments.factor}"]}
     children = single_robot(arguments.scenario, str(out / "bag"), extra)
     launcher = Launcher(children)
@@ -160,7 +162,7 @@ def _demo(arguments: argparse.Namespace) -> int:
     position, orientation = errors["position_error_m"], errors["orientation_error_rad"]
     good = code == 0 and position <= 0.02 and orientation <= 0.1
     print(f"final error: {1e3 * position:.1f} mm, {orientation:.3f} rad")
-    for name in ("trajectory.png", "animation.gif", "report.pdf", "bag"):
+    for name in (*PRODUCTS, "bag"):
         print(f"  {out / name}")
     return 0 if good else 1
 
@@ -168,6 +170,31 @@ def _demo(arguments: argparse.Namespace) -> int:
 def _record(arguments: argparse.Namespace) -> int:
     arguments.name, arguments.ros = "recorder", []
     return _node(arguments)
+
+
+def _view(arguments: argparse.Namespace) -> int:
+    from push_bringup.viewer import ViewerNode, ViewerServer
+    from push_ros.process import run_node
+    from push_ros.scenario import load_scenario
+
+    scenario = load_scenario(arguments.scenario)
+    server: ViewerServer | None = None
+
+    def make() -> ViewerNode:
+        nonlocal server
+        node = ViewerNode(scenario)
+        server = ViewerServer(node, arguments.host, arguments.port)
+        print(f"http://{arguments.host}:{server.port}/", flush=True)
+        return node
+
+    try:
+        return run_node(make)
+    except OSError as error:
+        print(f"error: port {arguments.port}: {error.strerror}; try --port 0", file=sys.stderr)
+        return 2
+    finally:
+        if server is not None:
+            server.close()
 
 
 def _report(arguments: argparse.Namespace) -> int:
@@ -208,7 +235,7 @@ def _experiment(arguments: argparse.Namespace) -> int:
         arguments.workers,
     )
     print(f"\n{out}/summary.json")
-    return 0 if summary["trials"] else 1
+    return 0 if len(summary["trials"]) == summary["requested"] else 1
 
 
 def _bench(arguments: argparse.Namespace) -> int:
@@ -234,7 +261,7 @@ def parser() -> argparse.ArgumentParser:
     scenario = {"default": "env1-target1", "help": "name in config/scenarios, or a YAML file"}
     p = add("demo", _demo, "start everything, push a box to its goal, record, report")
     p.add_argument("--scenario", **scenario)  # type: ignore[arg-type]
-    p.add_argument("--out", default="results/demo", help="folder, emptied first")
+    p.add_argument("--out", default="results/demo", help="folder; replaces an earlier demo")
     p.add_argument("--factor", type=float, default=1.0, help="sim time over wall time")
     p.add_argument("--timeout", type=float, default=220.0, help="[s] wall time")
     p = add("launch", _launch, "one process per node, until Ctrl-C")
@@ -249,8 +276,12 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("theta", type=float, help="[rad]")
     p.add_argument("--no-wait", action="store_true")
     p.add_argument("--timeout", type=float, default=300.0, help="[s] wall time")
-    p = add("record", _record, "record the suite's topics until Ctrl-C")
+    p = add("view", _view, "a live view in the browser; goals by mouse")
     p.add_argument("--scenario", **scenario)  # type: ignore[arg-type]
+    p.add_argument("--host", default="127.0.0.1", help="address to serve on")
+    p.add_argument("--port", type=int, default=8080, help="0: any that is free")
+    p = add("record", _record, "record the suite's topics until Ctrl-C")
+    p.add_argument("--scenario", required=True, help="that is running; it goes into the bag")
     p.add_argument("--out", required=True, help="bag folder")
     p = add("report", _report, "pictures and a page from a bag")
     p.add_argument("bag")

@@ -30,6 +30,8 @@ SUCCESS_ORIENTATION = 0.1
 
 THESIS = {  # Table 2.1: mean and worst position [m] and orientation [rad] error
     "env1-target1": (0.0130, 0.0200, 0.0456, 0.0622),
+    "env1-target2": (0.0269, 0.0585, 0.0698, 0.0985),
+    "env1-target3": (0.0114, 0.0292, 0.0365, 0.0476),
 }
 
 
@@ -46,6 +48,11 @@ class SingleRobotTask:
     latency: float = 0.01
     spread: float = 0.2
     record: bool = False
+
+    @property
+    def trace_file(self) -> Path:
+        """Where the trial leaves its trace; a scenario may be named by a path."""
+        return Path(self.out) / f"trace-{Path(self.scenario).stem}-{self.seed}.npz"
 
 
 def draw_world(task: SingleRobotTask) -> tuple[Scenario, Scenario, Row]:
@@ -122,7 +129,7 @@ def single_robot_trial(task: SingleRobotTask) -> Row:
         and trace.collisions == 0
     )
     np.savez_compressed(
-        folder / f"trace-{task.scenario}-{task.seed}.npz",
+        task.trace_file,
         time=np.array(trace.time[::10]),
         robot=np.array(trace.robot[::10]),
         object=np.array(trace.object[::10]),
@@ -184,6 +191,7 @@ def single_robot(
         "experiment": "single-robot",
         "seed": seed,
         "revision": revision(),
+        "requested": len(tasks),
         "trials": rows,
         "aggregate": aggregate(rows),
     }
@@ -195,7 +203,8 @@ def single_robot(
             writer.writeheader()
             writer.writerows(rows)
         for name in scenarios:
-            _plot(name, [r for r in rows if r["scenario"] == name], out)
+            files = [t.trace_file for t in tasks if t.scenario == name]
+            _plot(name, [r for r in rows if r["scenario"] == name], files, out)
     _print_table(rows, scenarios)
     return summary
 
@@ -204,33 +213,35 @@ def _print_table(rows: list[Row], scenarios: list[str]) -> None:
     print("\nscenario        success   position error [mm]        orientation error [rad]")
     print("                          mean   std   max  thesis     mean    std     max   thesis")
     for name in scenarios:
+        count = sum(r["scenario"] == name for r in rows)
+        wins = sum(r["scenario"] == name and bool(r["success"]) for r in rows)
         mine = [r for r in rows if r["scenario"] == name and "position_error_m" in r]
         if not mine:
+            print(f"{name:15s} {wins:3d}/{count:<3d}")
             continue
         p = 1e3 * np.array([r["position_error_m"] for r in mine])
         o = np.array([r["orientation_error_rad"] for r in mine])
-        wins = sum(bool(r["success"]) for r in mine)
         known = THESIS.get(name)
         tp = f"{1e3 * known[0]:.1f}/{1e3 * known[1]:.1f}" if known else "-"
         to = f"{known[2]:.3f}/{known[3]:.3f}" if known else "-"
         print(
-            f"{name:15s} {wins:3d}/{len(mine):<3d}  {p.mean():6.2f}{p.std():6.2f}{p.max():6.2f} "
+            f"{name:15s} {wins:3d}/{count:<3d}  {p.mean():6.2f}{p.std():6.2f}{p.max():6.2f} "
             f"{tp:>9s}   {o.mean():.4f} {o.std():.4f} {o.max():.4f} {to:>11s}"
         )
     print("(thesis: mean/worst of Table 2.1, real robots)")
 
 
-def _plot(name: str, rows: list[Row], out: Path) -> None:
+def _plot(name: str, rows: list[Row], traces: list[Path], out: Path) -> None:
     scenario = load_scenario(name)
     figure, axes = plt.subplots(figsize=(9, 6))
     draw_map(axes, scenario)
     outlines = outlines_of(scenario)
     item = next(iter(scenario.objects))
-    for row in rows:
-        path = out / f"trace-{name}-{row['seed']}.npz"
+    good_seeds = {r["seed"] for r in rows if r["success"]}
+    for path in traces:
         if path.is_file():
             way: Array = np.load(path)["object"]
-            good = row["success"]
+            good = int(path.stem.rsplit("-", 1)[1]) in good_seeds
             axes.plot(
                 way[:, 0], way[:, 1], lw=0.8, alpha=0.7, color="#2a62c9" if good else "#c22f3d"
             )
@@ -239,6 +250,6 @@ def _plot(name: str, rows: list[Row], out: Path) -> None:
         axes.fill(
             *se2.transform(scenario.goal, outlines[item][0]).T, fill=False, lw=1.6, color="#c22f3d"
         )
-    axes.set_title(f"{name}: {sum(bool(r['success']) for r in rows)} of {len(rows)} trials succeed")
-    figure.savefig(out / f"{name}.png", dpi=130, bbox_inches="tight")
+    axes.set_title(f"{scenario.name}: {len(good_seeds)} of {len(rows)} trials succeed")
+    figure.savefig(out / f"{scenario.name}.png", dpi=130, bbox_inches="tight")
     plt.close(figure)

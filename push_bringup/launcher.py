@@ -1,6 +1,5 @@
 """One process per node: start them, watch them, say which one died, stop them all."""
 
-import ctypes
 import os
 import signal
 import subprocess
@@ -9,9 +8,10 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from push_ros.process import prepare_environment
+from push_ros.process import die_with_parent, prepare_environment
 
 _GRACE = 2.5  # [s] after SIGINT, then SIGTERM
+_MOST_DEATHS = 5  # of one node, until it is not started again
 _LAST = 1.5  # [s] after SIGTERM, then SIGKILL
 
 
@@ -24,10 +24,13 @@ class Child:
     process: "subprocess.Popen[bytes] | None" = None
     deaths: int = 0
 
-
-def _die_with_parent() -> None:
-    """Linux: no child outlives a launcher that was killed."""
-    ctypes.CDLL(None).prctl(1, signal.SIGTERM)
+    @property
+    def words(self) -> list[str]:
+        """Its command line; one that was started again writes beside what is there."""
+        words = list(self.arguments)
+        if self.deaths and "--out" in words:
+            words[words.index("--out") + 1] += f"-{self.deaths + 1}"
+        return words
 
 
 class Launcher:
@@ -46,6 +49,7 @@ class Launcher:
         self._respawn = respawn
         self._say = say
         self._stopping = False
+        self._gave_up = False
         self._environment = prepare_environment(dict(os.environ))
 
     def start(self) -> None:
@@ -55,9 +59,9 @@ class Launcher:
                 self._start(child)
 
     def _start(self, child: Child) -> None:
-        command = [sys.executable, "-m", "push_bringup.cli", "node", *child.arguments]
+        command = [sys.executable, "-m", "push_bringup.cli", "node", *child.words]
         child.process = subprocess.Popen(
-            command, env=self._environment, start_new_session=True, preexec_fn=_die_with_parent
+            command, env=self._environment, start_new_session=True, preexec_fn=die_with_parent
         )
 
     def request_stop(self) -> None:
@@ -76,16 +80,21 @@ class Launcher:
             how = f"signal {-code}" if code < 0 else f"exit code {code}"
             self._say(f"{child.name} died ({how})")
             child.process = None
-            if self._respawn and not self._stopping and child.deaths <= 5:
-                self._say(f"{child.name} is started again")
-                self._start(child)
+            if not self._respawn or self._stopping:
+                continue
+            if child.deaths > _MOST_DEATHS:
+                self._say(f"{child.name} died {child.deaths} times; it is not started again")
+                self._gave_up = True
+                continue
+            self._say(f"{child.name} is started again")
+            self._start(child)
         return dead
 
     def run(self, finished: Callable[[], bool] = lambda: False) -> int:
         """Watch until stopped; 0 when asked to stop or finished, 1 when a child died."""
         code = 0
         while not self._stopping and not finished():
-            if self.check() and not self._respawn:
+            if self.check() and (self._gave_up or not self._respawn):
                 self._say("stopping the rest")
                 code = 1
                 break

@@ -21,6 +21,7 @@ from push_ros.conversions import pose_stamped_to_ros, time_from_ros
 from push_ros.process import Spinner, claim_domain, prepare_environment
 from push_ros.qos import COMMAND, LATCHED, STATUS, STREAM
 from push_ros.scenario import Scenario
+from push_ros.validation import planar_pose
 from push_supervisor.node import SupervisorNode
 from sim_bridge.node import BridgeNode
 
@@ -76,8 +77,7 @@ class Observer(Node):
         t = self.trace
         t.time.append(time_from_ros(message.header.stamp))
         for named in message.poses:
-            p, q = named.pose.position, named.pose.orientation
-            pose = np.array([p.x, p.y, se2.yaw_from_quaternion(q.x, q.y, q.z, q.w)])
+            pose = planar_pose(named.pose, named.name)
             if named.name == self._robot:
                 t.robot.append(pose)
             elif named.name == self._item:
@@ -203,15 +203,12 @@ class LockstepRun:
 
         def connected() -> bool:
             return (
-                self.supervisor._follow_client.ready
-                and self.supervisor._plan_client.ready
-                and self.supervisor._path_client.service_is_ready()
+                self.supervisor.ready
+                and self.planner.ready
                 and self.bridge.count_publishers(f"/{robot}/cmd_vel") > 0
                 and self.bridge.count_subscribers("/poses") >= 2
                 and self.observer.count_publishers("/ground_truth/poses") > 0
                 and self.observer.connected
-                and self.supervisor._grid is not None
-                and self.planner._grid is not None
                 and self.observer.state is not None
             )
 

@@ -91,7 +91,10 @@ class Monitor:
         assert self._goal is not None
         end = time.monotonic() + limit
         shown = 0.0
-        while time.monotonic() < end and alive():
+        while time.monotonic() < end:
+            if not alive():
+                print("error: the nodes have ended before the job", file=sys.stderr)
+                return 1
             self._spinner.once(0.1)
             state = self.state
             if self._news and state is not None and state.state == SupervisorState.IDLE:
@@ -100,8 +103,5 @@ class Monitor:
                 shown = time.monotonic()
                 gap = np.hypot(self.position[0] - self._goal[0], self.position[1] - self._goal[1])
                 print(f"  {gap:6.3f} m to go", flush=True)
-        print(
-            "error: the job did not end in time" if alive() else "error: a node died",
-            file=sys.stderr,
-        )
+        print("error: the job did not end in time", file=sys.stderr)
         return 1

@@ -19,8 +19,12 @@ from push_bringup.bag import read_bag, read_metadata
 from push_model import se2
 from push_model.arrays import Array
 from push_ros.scenario import Scenario, scenario_from_mapping
+from push_ros.validation import planar_pose
 
 _ROBOT, _OBJECT, _PLAN, _GOAL, _INK = "#2a62c9", "#d0751c", "#777777", "#c22f3d", "#222222"
+
+PRODUCTS = ("trajectory.png", "animation.gif", "report.pdf")
+"""Files that a report consists of."""
 
 
 @dataclass
@@ -54,11 +58,6 @@ def _seconds(stamp: Any) -> float:
     return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
 
 
-def _planar(pose: Any) -> Array:
-    p, q = pose.position, pose.orientation
-    return np.array([p.x, p.y, se2.yaw_from_quaternion(q.x, q.y, q.z, q.w)])
-
-
 def load(bag: Path) -> BagContents:
     """Read what the report needs."""
     metadata = read_metadata(bag)
@@ -83,14 +82,14 @@ def load(bag: Path) -> BagContents:
         if record.topic == "/ground_truth/poses":
             times.append(_seconds(m.header.stamp))
             for named in m.poses:
-                poses.setdefault(named.name, []).append(_planar(named.pose))
+                poses.setdefault(named.name, []).append(planar_pose(named.pose))
         elif record.topic == "/controller/status":
             if m.mode in (1, 2):
                 status.append([_seconds(m.header.stamp)] + [getattr(m, k) for k in STATUS[1:]])
         elif record.topic == "/supervisor/state":
             contents.states.append((_seconds(m.header.stamp), m.state_name, m.reason))
             if m.goal.header.frame_id:
-                contents.goal = _planar(m.goal.pose)
+                contents.goal = planar_pose(m.goal.pose)
         elif record.topic == "/push_plan":
             contents.plan = [np.column_stack([s.trajectory.x, s.trajectory.y]) for s in m.segments]
         else:

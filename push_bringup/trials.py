@@ -5,13 +5,20 @@ Every finished trial is written down at once, so that an interrupted study keeps
 
 import json
 import multiprocessing
+import multiprocessing.connection
 import os
+import signal
 import sys
+import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import ExitStack, closing, contextmanager
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
+
+from push_ros.process import die_with_parent
 
 Row = dict[str, Any]
 Trial = Callable[[Any], Row]
@@ -32,9 +39,12 @@ def run_trials(
     rows: dict[int, Row] = {}
     started = time.monotonic()
     journal.parent.mkdir(parents=True, exist_ok=True)
-    with journal.open("w", encoding="utf-8") as file:
+    with journal.open("w", encoding="utf-8") as file, ExitStack() as stack:
+        stack.enter_context(_sigterm_as_interrupt())
         try:
-            for index, row in _results(trial, tasks, scheduler, workers):
+            for index, row in stack.enter_context(
+                closing(_results(trial, tasks, scheduler, workers))
+            ):
                 rows[index] = row
                 file.write(json.dumps(row) + "\n")
                 file.flush()
@@ -50,43 +60,93 @@ def run_trials(
     return [rows[i] for i in sorted(rows)]
 
 
+@contextmanager
+def _sigterm_as_interrupt() -> Iterator[None]:
+    """SIGTERM ends a study as Ctrl-C does: what is finished is kept."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def interrupt(number: int, frame: Any) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
 def guarded(trial: Trial, task: Any) -> Row:
     """The trial's row, or a failed row that names the exception."""
     try:
         return trial(task)
     except Exception as error:
-        return {
-            "scenario": getattr(task, "scenario", ""),
-            "seed": getattr(task, "seed", None),
-            "success": False,
-            "reason": f"{type(error).__name__}: {error}",
-        }
+        return _failed(task, f"{type(error).__name__}: {error}")
+
+
+def _failed(task: Any, reason: str) -> Row:
+    return {
+        "scenario": getattr(task, "scenario", ""),
+        "seed": getattr(task, "seed", None),
+        "success": False,
+        "reason": reason,
+    }
 
 
 def _results(
     trial: Trial, tasks: Sequence[Any], scheduler: str, workers: int
-) -> Iterator[tuple[int, Row]]:
+) -> Generator[tuple[int, Row], None, None]:
     if scheduler:
         try:
             from dask.distributed import Client
             from dask.distributed import as_completed as dask_completed
         except ImportError:
             raise SystemExit("--scheduler needs Dask: pip install 'distributed'") from None
-        client = Client(scheduler)
-        futures = {client.submit(guarded, trial, t, pure=False): i for i, t in enumerate(tasks)}
-        for future in dask_completed(futures):
-            yield futures[future], future.result()
+        with Client(scheduler) as client:
+            futures = {client.submit(guarded, trial, t, pure=False): i for i, t in enumerate(tasks)}
+            for future in dask_completed(futures):
+                yield futures[future], future.result()
         return
-    count = workers or os.cpu_count() or 1
+    yield from _local_results(trial, tasks, workers or os.cpu_count() or 1)
+
+
+def _local_results(trial: Trial, tasks: Sequence[Any], workers: int) -> Iterator[tuple[int, Row]]:
+    """One process a trial: no state of ROS or PyBullet survives from one to the next."""
     context = multiprocessing.get_context("spawn")
-    # One process a trial: no state of ROS or PyBullet survives from one to the next.
-    with ProcessPoolExecutor(count, mp_context=context, max_tasks_per_child=1) as pool:
-        local: dict[Future[Row], int] = {
-            pool.submit(guarded, trial, task): i for i, task in enumerate(tasks)
-        }
-        try:
-            for done in as_completed(local):
-                yield local[done], done.result()
-        except KeyboardInterrupt:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    waiting = list(enumerate(tasks))[::-1]
+    running: dict[Connection, tuple[int, BaseProcess]] = {}
+    try:
+        while waiting or running:
+            while waiting and len(running) < workers:
+                index, task = waiting.pop()
+                receiver, sender = context.Pipe(duplex=False)
+                process = context.Process(target=_in_process, args=(sender, trial, task))
+                process.start()
+                sender.close()
+                running[receiver] = (index, process)
+            for ready in multiprocessing.connection.wait(list(running)):
+                assert isinstance(ready, Connection)
+                index, process = running.pop(ready)
+                try:
+                    row = ready.recv()
+                except EOFError:
+                    process.join()
+                    text = f"the trial's process died (exit code {process.exitcode})"
+                    row = _failed(tasks[index], text)
+                yield index, row
+                process.join()
+    finally:
+        for _, process in running.values():
+            process.terminate()
+        for _, process in running.values():
+            process.join(2.0)
+            if process.is_alive():
+                process.kill()
+
+
+def _in_process(sender: Connection, trial: Trial, task: Any) -> None:
+    """In a process of its own, which a key press does not reach and which outlives nobody."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    die_with_parent()
+    sender.send(guarded(trial, task))

@@ -15,12 +15,6 @@ def wrap(angle: float) -> float:
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
-def wrap_array(angle: Array) -> Array:
-    """The same angles in [-pi, pi), any shape."""
-    wrapped: Array = (np.asarray(angle) + np.pi) % (2.0 * np.pi) - np.pi
-    return wrapped
-
-
 def pose(x: float, y: float, theta: float) -> Array:
     """A pose ``(3,)``."""
     return np.array([x, y, theta], dtype=np.float64)

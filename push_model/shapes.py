@@ -106,11 +106,16 @@ class Shape:
 
     def dense_outline(self, spacing: float) -> Array:
         """``(m, 2)`` [m] points of the outline, vertices included, at most ``spacing`` apart."""
-        points = []
-        for a, b in zip(self.outline, np.roll(self.outline, -1, axis=0), strict=True):
-            n = max(1, math.ceil(float(np.hypot(*(b - a))) / spacing))
-            points.append(a + np.arange(n)[:, None] / n * (b - a))
-        return np.vstack(points)
+        return densified(self.outline, spacing)
+
+
+def densified(outline: Array, spacing: float) -> Array:
+    """``(m, 2)`` [m] points of a closed outline ``(n, 2)``, vertices included, so far apart."""
+    points = []
+    for a, b in zip(outline, np.roll(outline, -1, axis=0), strict=True):
+        n = max(1, math.ceil(float(np.hypot(*(b - a))) / spacing))
+        points.append(a + np.arange(n)[:, None] / n * (b - a))
+    return np.vstack(points)
 
 
 def polygon(vertices: Array, kind: str = "polygon") -> Shape:

@@ -91,6 +91,10 @@ class BoxSpec:
     size: tuple[float, float]
     yaw: float = 0.0
 
+    def __post_init__(self) -> None:
+        if not all(math.isfinite(s) and s > 0.0 for s in self.size):
+            raise SettingsError(f"size must be positive, got {self.size}")
+
 
 @dataclass(frozen=True)
 class CircleSpec:

@@ -29,7 +29,8 @@ class Reference:
 class MpcResult:
     """acceleration: (a, epsilon) to apply now; slack: greatest violation; solve_time [s] CPU.
 
-    solved is False when the acceleration must not be used; reason says why.
+    solved is False when the acceleration must not be used; reason says why. late: only because it
+    came after its deadline.
     """
 
     acceleration: tuple[float, float]
@@ -37,6 +38,7 @@ class MpcResult:
     slack: float
     solve_time: float
     reason: str
+    late: bool = False
 
 
 class LtvMpc:

@@ -35,9 +35,10 @@ from push_ros.parameters import declare_settings
 from push_ros.pose_tracker import PoseTracker, PoseTrackerSettings, Stamp
 from push_ros.qos import COMMAND, STATUS, STREAM
 from push_ros.scenario import Scenario, load_scenario
-from push_ros.validation import InvalidMessage, check_frame, finite, planar_pose
+from push_ros.validation import FRAME, InvalidMessage, check_frame, finite, planar_pose
 
-_GIVE_UP = 5.0  # [s] wall time without poses until a task is given up
+_GIVE_UP = 5.0  # [s] without poses until a task is given up
+_AHEAD = 1.0  # [s] that a heartbeat's stamp may lie ahead of the poses
 
 
 class ControllerNode(Node):
@@ -74,8 +75,9 @@ class ControllerNode(Node):
             )
         )
         self._object = ""
-        self._heartbeat = 0.0
+        self._heartbeat = self._heartbeat_wall = 0.0
         self._heartbeat_timeout = 0.0
+        self._held = 0.0  # [s] without a pose that this task needs
         self._ticks = 0
         self._last_wall = time.monotonic()
         self._last_stamp = Header().stamp
@@ -96,7 +98,7 @@ class ControllerNode(Node):
             check=self._parse,
             start=self._begin,
             cancel=self._canceled,
-            preempted=lambda: self._result(
+            preempt=lambda: self._end(
                 FollowTrajectory.Result.PREEMPTED, "a new trajectory replaces this one"
             ),
         )
@@ -135,6 +137,9 @@ class ControllerNode(Node):
     def _parse(self, request: Any) -> tuple[Task, float]:
         """A task from a goal; raises InvalidMessage."""
         check_frame(request.trajectory.header.frame_id, "the trajectory")
+        finite(request.heartbeat_timeout, "the heartbeat timeout")
+        if request.heartbeat_timeout < 0.0:
+            raise InvalidMessage("the heartbeat timeout must not be negative; 0 watches none")
         trajectory = trajectory_from_ros(request.trajectory)
         tolerances = (request.position_tolerance, request.orientation_tolerance)
         finite(tolerances, "a tolerance")
@@ -159,7 +164,8 @@ class ControllerNode(Node):
     def _begin(self, request: Any) -> None:
         task, self._heartbeat_timeout = self._parse(request)
         self._object = request.object if task.push is not None else ""
-        self._heartbeat = self._poses.stamp
+        self._heartbeat, self._heartbeat_wall = self._poses.stamp, time.monotonic()
+        self._held = 0.0
         self.tracker.start(task)
         self._mode = ControllerStatus.PUSH if task.push else ControllerStatus.MOVE
         self._reason = "following a trajectory"
@@ -182,10 +188,14 @@ class ControllerNode(Node):
         return result
 
     def _on_heartbeat(self, message: Header) -> None:
-        self._heartbeat = max(self._heartbeat, time_from_ros(message.stamp))
+        stamp = time_from_ros(message.stamp)
+        if stamp > self._poses.stamp + _AHEAD:
+            self._diagnostics.refuse(f"/{self.robot}/heartbeat", "its stamp lies in the future")
+            return
+        self._heartbeat, self._heartbeat_wall = max(self._heartbeat, stamp), time.monotonic()
 
     def _on_poses(self, message: NamedPoses) -> None:
-        if message.header.frame_id != "map":
+        if message.header.frame_id != FRAME:
             self._diagnostics.refuse("/poses", f"frame '{message.header.frame_id}'")
             return
         before = self._poses.stamp
@@ -218,9 +228,7 @@ class ControllerNode(Node):
             self._publish_command(0.0, 0.0)
             self._publish_status(None)
             return
-        if self._heartbeat_timeout > 0.0 and (
-            self._poses.stamp - self._heartbeat > self._heartbeat_timeout
-        ):
+        if 0.0 < self._heartbeat_timeout < self._silence_of_supervisor():
             self._end(FollowTrajectory.Result.PREEMPTED, "the supervisor is gone")
             self._publish_command(0.0, 0.0)
             self._publish_status(None)
@@ -231,12 +239,18 @@ class ControllerNode(Node):
             tracker.v = tracker.omega = 0.0
             self._mode = ControllerStatus.HOLD
             self._reason = f"no valid pose of {self.robot if robot is None else self._object}"
+            self._held += dt
+            if self._held > _GIVE_UP:
+                self._end(
+                    FollowTrajectory.Result.POSES_STALE, f"{self._reason} for {_GIVE_UP:.0f} s"
+                )
             self._ticks += 1
             if self._ticks % 10 == 0:
                 self._server.feedback(FollowTrajectory.Feedback())
             self._publish_command(0.0, 0.0)
             self._publish_status(None)
             return
+        self._held = 0.0
         age = self._poses.age(self.robot)
         if age > 0.0:  # dead reckoning over a drop-out
             robot = unicycle_step(robot, tracker.v, tracker.omega, age)
@@ -262,6 +276,14 @@ class ControllerNode(Node):
                 )
             )
 
+    def _silence_of_supervisor(self) -> float:
+        """[s] since its last heartbeat, in pose time or wall time, whichever is less.
+
+        Pose time alone runs fast in a simulation that does; wall time alone runs on in a pause.
+        """
+        wall = time.monotonic() - self._heartbeat_wall
+        return min(self._poses.stamp - self._heartbeat, wall)
+
     def _publish_command(self, v: float, omega: float) -> None:
         if not (math.isfinite(v) and math.isfinite(omega)):
             v = omega = 0.0
@@ -278,7 +300,7 @@ class ControllerNode(Node):
             obstacle_margin=math.inf,
         )
         message.header.stamp = self._last_stamp
-        message.header.frame_id = "map"
+        message.header.frame_id = FRAME
         if tick is not None:
             e = tick.error
             message.error_x, message.error_y, message.error_theta = (
@@ -301,6 +323,7 @@ class ControllerNode(Node):
         silence = time.monotonic() - self._last_wall
         if not self.tracker.active or silence < 2.0 * self._poses.settings.timeout:
             return
+        self.tracker.v = self.tracker.omega = 0.0
         self._publish_command(0.0, 0.0)
         if silence > _GIVE_UP:
             self._end(FollowTrajectory.Result.POSES_STALE, f"no poses for {silence:.1f} s")

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from push_model.settings import bounded
+from push_model.settings import SettingsError, bounded
 
 
 @dataclass(frozen=True)
@@ -24,9 +24,15 @@ class MpcSettings:
     )
     max_obstacles: int = bounded(20, low=0, high=200, doc="nearest obstacles in the QP")
     slack_linear: float = bounded(1000.0, low=0.0, high=1e6, doc="price of a softened row")
-    slack_quadratic: float = bounded(20000.0, low=0.0, high=1e8, doc="price of a softened row")
+    slack_quadratic: float = bounded(20000.0, low=1e-3, high=1e8, doc="price of a softened row")
     max_slack: float = bounded(0.3, low=0.0, high=100.0, doc="violation that counts as infeasible")
     backend: Literal["active_set", "daqp", "osqp"] = "active_set"
+
+    def __post_init__(self) -> None:
+        if min(self.state_weight) < 0.0 or min(self.input_rate_weight) < 0.0:
+            raise SettingsError("weights must not be negative")
+        if min(self.input_weight) <= 0.0:
+            raise SettingsError("input_weight must be positive: without it there are many optima")
 
 
 @dataclass(frozen=True)
@@ -52,3 +58,12 @@ class TrackerSettings:
     )
     stuck_time: float = bounded(1.5, low=0.1, high=60.0, doc="[s] commanded but not moving")
     stuck_way: float = bounded(0.03, low=1e-3, high=1.0, doc="[m] commanded in that time")
+    blocked_time: float = bounded(
+        4.0, low=0.1, high=600.0, doc="[s] that the reference waits for a robot that lags behind"
+    )
+
+    def __post_init__(self) -> None:
+        if self.lag_end <= self.lag_begin:
+            raise SettingsError(
+                f"lag_end ({self.lag_end}) must be greater than lag_begin ({self.lag_begin})"
+            )

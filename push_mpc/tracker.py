@@ -78,6 +78,8 @@ class Tick:
 
 _NO_CIRCLES = np.zeros((0, 3))
 _SOLVER_PATIENCE = 10  # failed solves in a row until the task is given up
+_FADE = 0.1  # [s] in which the last command fades to zero while solves are late
+_HALTED = 0.02  # of the nominal pace: slower than that, the reference stands still
 
 
 class TrajectoryTracker:
@@ -116,6 +118,8 @@ class TrajectoryTracker:
         self._grasp_seen = False
         self._lost = 0.0
         self._bad = 0
+        self._faded = 1.0
+        self._halted = 0.0
         self._history: deque[tuple[float, Array]] = deque()
         self._commanded = 0.0
         self._recent: deque[tuple[float, float, float]] = deque()
@@ -168,7 +172,7 @@ class TrajectoryTracker:
         else:
             solve = self._solve(task, robot, error, reference, limits)
             self._apply(solve, dt, limits)
-            if self._bad > _SOLVER_PATIENCE:
+            if self._bad >= _SOLVER_PATIENCE:
                 finished, code, message = True, TrackError.SOLVER_FAILED, solve.reason
                 self.stop()
         curvature_margin = math.inf
@@ -204,7 +208,7 @@ class TrajectoryTracker:
         solve = self.mpc.solve(error, reference, limits, self._nearest(task, robot))
         late = time.perf_counter() - started
         if 0.0 < self.settings.deadline < late:
-            return replace(solve, solved=False, reason=f"late: {1e3 * late:.1f} ms")
+            return replace(solve, solved=False, late=True, reason=f"late: {1e3 * late:.1f} ms")
         return solve
 
     def _without_delay(self, robot: Array, dt: float) -> Array:
@@ -235,6 +239,8 @@ class TrajectoryTracker:
         """Move the reference on, slower when the robot lags behind."""
         s = self.settings
         rate = min(1.0, max(0.0, (s.lag_end - self._lag) / (s.lag_end - s.lag_begin)))
+        ended = self._time >= task.trajectory.duration
+        self._halted = self._halted + dt if rate < _HALTED and not ended else 0.0
         self._time = min(self._time + rate * dt, task.trajectory.duration)
         p, h = self.mpc.settings.horizon, self.mpc.settings.step
         pose, twist = task.trajectory.sample(self._time + rate * h * np.arange(p + 1))
@@ -304,6 +310,10 @@ class TrajectoryTracker:
                     f"the object is {1e3 * gap:.0f} mm ahead, {1e3 * aside:.0f} mm aside and "
                     f"{turn:.2f} rad turned from its place at the bumper"
                 )
+        if self._halted > s.blocked_time:
+            return TrackError.STUCK, (
+                f"the reference waited {s.blocked_time:.1f} s for the robot; is the way blocked?"
+            )
         self._history.append((dt, robot))
         self._commanded += abs(self.v) * dt + abs(self.omega) * 0.03 * dt
         span = sum(step for step, _ in self._history)
@@ -338,17 +348,16 @@ class TrajectoryTracker:
         return float((np.hypot(c[:, 0] - robot[0], c[:, 1] - robot[1]) - c[:, 2]).min())
 
     def _apply(self, solve: MpcResult, dt: float, limits: CurvatureLimits | None) -> None:
-        """Algorithm 3: integrate the acceleration; without a solution fade to a stop."""
+        """Algorithm 3: integrate the acceleration; without a solution stop, when late fade."""
         self.solves += 1
         if not solve.solved:
             self.failures += 1
             self._bad += 1
-            fade = max(0.0, 1.0 - dt / 0.1)
-            self.v, self.omega = self.v * fade, self.omega * fade
-            if "not finite" in solve.reason:
-                self.v = self.omega = 0.0
+            left = max(0.0, self._faded - dt / _FADE) if solve.late else 0.0
+            keep = left / self._faded if self._faded > 0.0 else 0.0
+            self.v, self.omega, self._faded = self.v * keep, self.omega * keep, left
             return
-        self._bad = 0
+        self._bad, self._faded = 0, 1.0
         v = self.v + dt * solve.acceleration[0]
         omega = self.omega + dt * solve.acceleration[1]
         if limits is not None:

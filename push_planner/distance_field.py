@@ -13,7 +13,7 @@ from push_model.occupancy import OccupancyGrid
 
 
 @numba.njit(cache=True, fastmath=True)
-def _lookup(field: Any, x: float, y: float, ox: float, oy: float, scale: float) -> float:
+def lookup(field: Any, x: float, y: float, ox: float, oy: float, scale: float) -> float:
     """Bilinear interpolation between cell centres; 0 outside the grid."""
     u = (x - ox) * scale - 0.5
     v = (y - oy) * scale - 0.5
@@ -29,7 +29,7 @@ def _lookup(field: Any, x: float, y: float, ox: float, oy: float, scale: float) 
 
 
 @numba.njit(cache=True, fastmath=True)
-def _points_clearance(
+def points_clearance(
     field: Any,
     points: Any,
     x: float,
@@ -39,12 +39,13 @@ def _points_clearance(
     oy: float,
     scale: float,
 ) -> float:
+    """Least distance [m] of points ``(n, 2)`` of a body at a pose, by bilinear interpolation."""
     c, s = math.cos(theta), math.sin(theta)
     least = 1e9
     for k in range(points.shape[0]):
         px = x + c * points[k, 0] - s * points[k, 1]
         py = y + s * points[k, 0] + c * points[k, 1]
-        d = _lookup(field, px, py, ox, oy, scale)
+        d = lookup(field, px, py, ox, oy, scale)
         if d < least:
             least = d
     return float(least)
@@ -68,7 +69,7 @@ def _segment_clearance(
     least = 1e9
     for k in range(n + 1):
         t = k / n
-        d = _lookup(field, x0 + (x1 - x0) * t, y0 + (y1 - y0) * t, ox, oy, scale)
+        d = lookup(field, x0 + (x1 - x0) * t, y0 + (y1 - y0) * t, ox, oy, scale)
         if d < least:
             least = d
             if least < enough:
@@ -88,11 +89,11 @@ class DistanceField:
 
     def at(self, x: float, y: float) -> float:
         """[m] at a point; 0 outside the grid."""
-        return float(_lookup(self.values, x, y, *self.args))
+        return float(lookup(self.values, x, y, *self.args))
 
     def clearance(self, outline: Array, pose: Array) -> float:
         """[m] of an outline ``(n, 2)`` placed at a pose ``(3,)``."""
-        return float(_points_clearance(self.values, outline, pose[0], pose[1], pose[2], *self.args))
+        return float(points_clearance(self.values, outline, pose[0], pose[1], pose[2], *self.args))
 
     def segment(
         self, start: Sequence[float] | Array, end: Sequence[float] | Array, enough: float = -1.0

@@ -1,5 +1,6 @@
 """The planner node: the PlanPush action and the PlanRobotPath service."""
 
+import math
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -38,6 +39,7 @@ from push_ros.qos import LATCHED
 from push_ros.scenario import Scenario, load_scenario
 from push_ros.validation import FRAME, InvalidMessage, planar_pose
 
+_SIGN_OF_LIFE = 0.5  # [s] wall time between feedback messages at most
 _MAP_PATIENCE = 5.0  # [s] wall time that a request waits for the first map
 
 
@@ -79,9 +81,7 @@ class PlannerNode(Node):
             check=lambda request: None,
             start=self._begin,
             cancel=self._canceled,
-            preempted=lambda: PlanPush.Result(
-                error_code=PlanPush.Result.CANCELED, error_msg="a new request replaces this one"
-            ),
+            preempt=lambda: self._canceled("a new request replaces this one"),
         )
         self.create_service(PlanRobotPath, "/plan_robot_path", self._on_robot_path)
         self._watchdog = self.create_timer(
@@ -90,6 +90,11 @@ class PlannerNode(Node):
         self._on_grid(self._scenario.grid)  # until a map comes, and to warm up
         self._warm_up()
         self._grid = None
+
+    @property
+    def ready(self) -> bool:
+        """Whether the map is known."""
+        return self._grid is not None
 
     def _apply(self, settings: PlannerSettings) -> None:
         if self._work is not None:
@@ -140,7 +145,7 @@ class PlannerNode(Node):
             self.get_logger().debug(f"warm-up: {error}")
 
     def _begin(self, request: Any) -> None:
-        self._started = time.monotonic()
+        self._started, self._told = time.monotonic(), 0.0
         self._best = None
         self._work = None
         try:
@@ -186,7 +191,9 @@ class PlannerNode(Node):
         self._best = progress.best
         if improved and self._best is not None:
             self._publish(self._best)
-            cost = self._best.cost
+        if improved or elapsed - self._told > _SIGN_OF_LIFE:
+            self._told = elapsed
+            cost = math.inf if self._best is None else self._best.cost
             self._server.feedback(
                 PlanPush.Feedback(elapsed=elapsed, best_cost=cost, stage=progress.stage)
             )
@@ -217,9 +224,9 @@ class PlannerNode(Node):
         self.failures += 1
         self._server.finish(PlanPush.Result(error_code=code, error_msg=message), success=False)
 
-    def _canceled(self) -> None:
+    def _canceled(self, why: str = "canceled") -> None:
         self._pending = False
-        self._fail(PlanPush.Result.CANCELED, "canceled")
+        self._fail(PlanPush.Result.CANCELED, why)
 
     def _on_robot_path(self, request: Any, response: Any) -> Any:
         try:

@@ -19,6 +19,8 @@ from push_planner.push_search import PushSearch, PushStep, SearchStatistics
 from push_planner.scene import PushScene
 from push_planner.settings import PlannerSettings
 
+_WORTH = 0.01  # of the cost that a further plan must save
+
 
 class PlanError(IntEnum):
     """Why there is no plan; the codes of the PlanPush action."""
@@ -127,7 +129,9 @@ class PushPlanner:
         iterations = 0
         totals = SearchStatistics()
         base = self.settings.seed if seed is None else seed
+        left = self.settings.total_expansions
         for round_number in range(1 + self.settings.improvement_rounds):
+            weight = max(1.0, self.settings.heuristic_weight / 2.0**round_number)
             guides = []
             for guide in self._guides(start, goal, base + round_number):
                 guides.append(guide)
@@ -136,15 +140,21 @@ class PushPlanner:
             any_guide |= bool(guides)
             guides.sort(key=lambda g: g.cost)
             for number, guide in enumerate(guides):
-                if best is not None and guide.length >= 1.5 * best.cost:
+                if left <= 0:
+                    break
+                bound = np.inf if best is None else (1.0 - _WORTH) * best.cost
+                if guide.length >= 1.5 * bound:
                     continue
-                bound = np.inf if best is None else best.cost - 1e-6
-                search = PushSearch(self.scene, guide, start, goal, bound)
+                effort = min(left, self.settings.max_expansions)
+                search = PushSearch(self.scene, guide, start, goal, bound, weight, effort)
                 for _ in search.run():
                     yield Progress(f"push search, round {round_number + 1}.{number + 1}", best)
                 for name in vars(totals):
                     setattr(totals, name, getattr(totals, name) + getattr(search.statistics, name))
+                left -= search.statistics.expanded
                 if search.solution is not None:
+                    if best is None:
+                        left = self.settings.improvement_expansions
                     statistics = PlanStatistics(
                         iterations,
                         totals.expanded,

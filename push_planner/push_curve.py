@@ -17,6 +17,7 @@ from push_model.arrays import Array
 
 _COARSE, _DENSE = 41, 321
 _GRID = 10
+_STARTS = 3
 _SHORTEST = 0.02  # [m] least k_i, k_f; (2.6)
 
 
@@ -125,6 +126,25 @@ def _reduce_violation(
     return ki, kf, worst
 
 
+@numba.njit(cache=True)
+def _lowest_minimum(values: Any) -> tuple[int, int]:
+    """Where the lowest of the local minima is; (-1, -1) when all are infinite."""
+    n, m = values.shape
+    lowest, at = math.inf, (-1, -1)
+    for i in range(n):
+        for j in range(m):
+            v = values[i, j]
+            if v < lowest:
+                minimum = True
+                for p in range(max(0, i - 1), min(n, i + 2)):
+                    for q in range(max(0, j - 1), min(m, j + 2)):
+                        if values[p, q] < v:
+                            minimum = False
+                if minimum:
+                    lowest, at = v, (i, j)
+    return at
+
+
 @numba.njit(cache=True, fastmath=True)
 def _solve(
     x: float, y: float, c: float, s: float, low: float, high: float, coarse: Any, dense: Any
@@ -134,25 +154,33 @@ def _solve(
     top = 6.0 * distance + 1.0
     ratio = (top / _SHORTEST) ** (1.0 / (_GRID - 1))
     best, ki, kf = 1e18, _SHORTEST, _SHORTEST
-    least, vi, vf = 1e18, _SHORTEST, _SHORTEST
+    violations = np.empty((_GRID, _GRID))
     mi = _SHORTEST
-    for _ in range(_GRID):
+    for i in range(_GRID):
         mf = _SHORTEST
-        for _ in range(_GRID):
+        for j in range(_GRID):
             length, violation = _evaluate(mi, mf, x, y, c, s, low, high, coarse)
+            violations[i, j] = violation
             if violation <= 0.0 and length < best:
                 best, ki, kf = length, mi, mf
-            if violation < least:
-                least, vi, vf = violation, mi, mf
             mf *= ratio
         mi *= ratio
     step = 0.5 * math.log(ratio)
+    # No cell is feasible: the valley is narrower than a cell; go down from the lowest local minima.
+    for _ in range(_STARTS):
+        if best < 1e17:
+            break
+        i, j = _lowest_minimum(violations)
+        if i < 0:
+            break
+        least = violations[i, j]
+        violations[i, j] = math.inf
+        ki, kf = _SHORTEST * ratio**i, _SHORTEST * ratio**j
+        ki, kf, least = _reduce_violation(ki, kf, least, step, x, y, c, s, low, high, coarse)
+        if least <= 0.0:
+            best, _ = _evaluate(ki, kf, x, y, c, s, low, high, coarse)
     if best > 1e17:
-        vi, vf, least = _reduce_violation(vi, vf, least, step, x, y, c, s, low, high, coarse)
-        if least > 0.0:
-            return vi, vf, 0.0, False
-        ki, kf = vi, vf
-        best, _ = _evaluate(ki, kf, x, y, c, s, low, high, coarse)
+        return ki, kf, 0.0, False
     ki, kf, best = _refine(ki, kf, best, step, x, y, c, s, low, high, coarse)
     # Peaks between the coarse samples: tighten by what they exceed the limits, solve again.
     tight_low, tight_high = low, high
@@ -160,8 +188,8 @@ def _solve(
         length, violation = _evaluate(ki, kf, x, y, c, s, low, high, dense)
         if violation <= 0.0:
             return ki, kf, length, True
-        tight_low += 1.05 * violation + 1e-6
-        tight_high -= 1.05 * violation + 1e-6
+        tight_low += 1.2 * violation + 1e-4 * high
+        tight_high -= 1.2 * violation + 1e-4 * high
         if tight_low >= 0.0 or tight_high <= 0.0:
             break
         _, worst = _evaluate(ki, kf, x, y, c, s, tight_low, tight_high, coarse)

@@ -2,6 +2,13 @@
 
 The search runs backward from the goal, as in the thesis. A node is an object pose on Gamma and the
 side on which the push that starts there pushes; its parent is nearer to the goal.
+
+Algorithm 2 tries pushes from the farthest waypoint on and stops after a few that have any. That
+loses plans: where the far ones lead nowhere, the near ones are never tried. Here a node is expanded
+one waypoint at a time (partial expansion A*): it goes back into the queue with the least cost that
+its next waypoint can have. No push is lost, and far ones are still tried first. The distance to
+the start is weighted, so that a first plan is found early; later searches are less greedy, and drop
+what cannot be shorter than the best plan so far.
 """
 
 import heapq
@@ -11,14 +18,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from push_model import se2
 from push_model.arrays import Array
+from push_model.stable_push import CurvatureLimits
 from push_planner.guide_path import GuidePath, waypoints
 from push_planner.push_curve import PushCurve, shortest_push_curve
 from push_planner.scene import PushScene, PushSide
 from push_planner.settings import PlannerSettings
 
+_NEAREST = 0.03  # [m] of a push
 _WIDEST_BEARING = 2.0  # [rad] of a push's end seen from its start, and the other way round
 
 
@@ -56,22 +66,30 @@ class PushStep:
 
 @dataclass
 class PushSearch:
-    """A search along one guide path. ``run`` yields after each expansion."""
+    """A search along one guide path. ``run`` yields after each partial expansion.
+
+    bound: cost [m] that a solution must stay below. weight: of the heuristic, >= 1. expansions:
+    how many there may be.
+    """
 
     scene: PushScene
     guide: GuidePath
     start: Array
     goal: Array
-    bound: float = math.inf
+    bound: float
+    weight: float
+    expansions: int
     statistics: SearchStatistics = field(default_factory=SearchStatistics)
     solution: tuple[PushStep, ...] | None = None
     cost: float = math.inf
+    _room: dict[bytes, bool] = field(default_factory=dict)
 
     def run(self) -> Iterator[None]:
-        """Algorithm 1. ``bound``: nodes with f above it are not worth expanding."""
+        """Algorithm 1."""
         settings = self.scene.settings
         points, headings, way = waypoints(self.guide, settings.waypoint_spacing)
         poses = self._poses(points, headings, settings)
+        starts = [self._robot_poses(p) for p in poses]
         last = len(poses) - 1
         root = _Node(self.goal, (last, -1), None, 0.0, math.inf)
         counter = itertools.count()
@@ -83,26 +101,38 @@ class PushSearch:
             self._distances(poses[-2]),
             np.full(1, way[-1]),
         ]
-        queue = [(float(way[-1]), next(counter), root)]
+        # estimate, tie-break, node, waypoint to push from next
+        queue = [(float(way[-1]), next(counter), root, 0)]
         settled: set[tuple[int, int, int]] = set()
-        while queue and self.statistics.expanded < settings.max_expansions:
-            estimate, _, node = heapq.heappop(queue)
-            if estimate >= self.bound:
-                return
-            key = (*node.place, -1 if node.side is None else node.side.index)
-            if key in settled:
-                continue
-            settled.add(key)
-            if node.place[0] == 0:
-                self.solution, self.cost = self._trace(node), node.cost
-                return
+        while queue and self.statistics.expanded < self.expansions:
+            estimate, _, node, waypoint = heapq.heappop(queue)
+            if waypoint == 0:
+                key = (*node.place, -1 if node.side is None else node.side.index)
+                if key in settled:
+                    continue
+                settled.add(key)
+                if node.place[0] == 0:
+                    self.solution, self.cost = self._trace(node), node.cost
+                    return
             self.statistics.expanded += 1
-            for child in self._successors(node, poses):
+            remaining = rest[waypoint]
+            for child in self._successors(
+                node, poses[waypoint], starts[waypoint], remaining, waypoint
+            ):
                 self.statistics.generated += 1
                 key = (*child.place, child.side.index if child.side else -1)
-                if key not in settled:
-                    h = float(rest[child.place[0]][child.place[1]])
-                    heapq.heappush(queue, (child.cost + h, next(counter), child))
+                h = float(remaining[child.place[1]])
+                if key not in settled and child.cost + h < self.bound:
+                    f = child.cost + self.weight * h
+                    heapq.heappush(queue, (f, next(counter), child, 0))
+            following = waypoint + 1
+            if following < node.place[0] and poses[following]:
+                ahead = np.array(poses[following])[:, :2] - node.pose[:2]
+                ahead_way, to_start = np.hypot(*ahead.T), rest[following]
+                if node.cost + float((ahead_way + to_start).min()) < self.bound:
+                    least = node.cost + float((ahead_way + self.weight * to_start).min())
+                    entry = (max(estimate, least), next(counter), node, following)
+                    heapq.heappush(queue, entry)
             yield
 
     def _distances(self, poses: list[Array]) -> Array:
@@ -146,37 +176,68 @@ class PushSearch:
         before, after = self._runs(self.start, 1.0), self._runs(self.goal, -1.0)
         return [result[0], before, *result[1:], after, [self.goal]]
 
-    def _successors(self, node: _Node, poses: list[list[Array]]) -> Iterator[_Node]:
-        """Algorithm 2: pushes that end at the node, from the farthest waypoints that have any."""
-        successful = 0
-        for index in range(node.place[0]):
-            found = False
-            for number, pose in enumerate(poses[index]):
-                for side in self.scene.sides:
-                    child = self._push(pose, (index, number), side, node)
+    def _robot_poses(self, poses: list[Array]) -> list[Array]:
+        """For each side, the robot ``(n, 3)`` in contact with the object at the poses."""
+        table = np.array(poses).reshape(-1, 3)
+        c, s = np.cos(table[:, 2]), np.sin(table[:, 2])
+        result = []
+        for side in self.scene.sides:
+            x, y, theta = se2.inverse(side.grasp)
+            position = table[:, :2] + np.column_stack([c * x - s * y, s * x + c * y])
+            result.append(np.column_stack([position, table[:, 2] + theta]))
+        return result
+
+    def _successors(
+        self,
+        node: _Node,
+        poses: list[Array],
+        starts: list[Array],
+        remaining: Array,
+        waypoint: int,
+    ) -> Iterator[_Node]:
+        """Pushes from the poses at one waypoint that end at the node, as far as they can be part of
+        a solution below the bound; remaining: of each pose, the way to the start."""
+        for side, robots in zip(self.scene.sides, starts, strict=True):
+            end = side.robot_pose(node.pose)
+            way = np.hypot(*(robots[:, :2] - end[:2]).T)
+            promising = np.flatnonzero(
+                worth_trying(robots, end, side.trusted) & (node.cost + way + remaining < self.bound)
+            )
+            if len(promising) == 0 or not self._has_room(end):
+                continue
+            for number in promising.tolist():
+                start = robots[number]
+                if self._has_room(start):
+                    place = (waypoint, number)
+                    child = self._push(poses[number], place, start, end, side, node)
                     if child is not None:
-                        found = True
                         yield child
-            successful += found
-            if successful >= self.scene.settings.successor_waypoints:
-                return
+
+    def _has_room(self, robot: Array) -> bool:
+        key = robot.tobytes()
+        if key not in self._room:
+            self._room[key] = self.scene.has_room(robot)
+        return self._room[key]
 
     def _push(
-        self, pose: Array, place: tuple[int, int], side: PushSide, node: _Node
+        self,
+        pose: Array,
+        place: tuple[int, int],
+        start: Array,
+        end: Array,
+        side: PushSide,
+        node: _Node,
     ) -> _Node | None:
-        start, end = side.robot_pose(pose), side.robot_pose(node.pose)
-        if not _worth_trying(start, end):
-            return None
         self.statistics.solved += 1
         curve = shortest_push_curve(start, end, side.trusted.minimum, side.trusted.maximum)
         if curve is None:
             return None
         needed = self.scene.settings.safety_distance
         clearance = self.scene.curve_clearance(curve, side, needed)
-        if clearance < needed or not self.scene.has_room(start) or not self.scene.has_room(end):
+        if clearance < needed:
             return None
         self.statistics.feasible += 1
-        cost = node.cost + curve.length
+        cost = node.cost + curve.length + self.scene.settings.push_cost
         if node.side is not None and node.side.index != side.index:
             other = node.side.robot_pose(node.pose)
             cost += float(np.hypot(*(other - end)[:2])) + self.scene.settings.side_change_cost
@@ -193,13 +254,17 @@ class PushSearch:
         return tuple(steps)
 
 
-def _worth_trying(start: Array, end: Array) -> bool:
-    """Whether a forward push could reach the end, judged by bearings."""
-    dx, dy = end[0] - start[0], end[1] - start[1]
-    if math.hypot(dx, dy) < 0.03:
-        return False
-    bearing = math.atan2(dy, dx)
-    return (
-        abs(se2.wrap(bearing - start[2])) < _WIDEST_BEARING
-        and abs(se2.wrap(bearing - end[2])) < _WIDEST_BEARING
-    )
+def worth_trying(starts: Array, end: Array, limits: CurvatureLimits) -> NDArray[np.bool_]:
+    """Whether a push that does not loop could lead from starts ``(n, 3)`` to end ``(3,)``.
+
+    Either pose must lie outside the tightest circle that the other one touches on that side.
+    """
+    dx, dy = end[0] - starts[:, 0], end[1] - starts[:, 1]
+    distance, bearing = np.hypot(dx, dy), np.arctan2(dy, dx)
+    worth: NDArray[np.bool_] = distance >= _NEAREST
+    for angle in (bearing - starts[:, 2], end[2] - bearing):
+        angle = (angle + math.pi) % (2.0 * math.pi) - math.pi
+        diameter = np.where(angle > 0.0, 2.0 / limits.maximum, -2.0 / limits.minimum)
+        worth &= np.abs(angle) <= _WIDEST_BEARING
+        worth &= distance >= diameter * np.sin(np.minimum(np.abs(angle), 0.5 * math.pi))
+    return worth

@@ -8,6 +8,7 @@ import numpy as np
 
 from push_model import se2
 from push_model.arrays import Array
+from push_model.shapes import densified
 from push_model.specs import ObjectSpec, RobotSpec
 from push_model.stable_push import (
     CurvatureLimits,
@@ -15,7 +16,7 @@ from push_model.stable_push import (
     contact_on_side,
     curvature_limits,
 )
-from push_planner.distance_field import DistanceField, _lookup, _points_clearance
+from push_planner.distance_field import DistanceField, lookup, points_clearance
 from push_planner.push_curve import PushCurve
 from push_planner.settings import PlannerSettings
 
@@ -40,13 +41,13 @@ def _sweep(
     least = 1e9
     for i in range(robots.shape[0]):
         x, y, theta = robots[i, 0], robots[i, 1], robots[i, 2]
-        d = _points_clearance(field, robot_points, x, y, theta, ox, oy, scale)
+        d = points_clearance(field, robot_points, x, y, theta, ox, oy, scale)
         c, s = np.cos(theta), np.sin(theta)
         px = x + c * offset[0] - s * offset[1]
         py = y + s * offset[0] + c * offset[1]
-        rough = _lookup(field, px, py, ox, oy, scale) - object_radius
+        rough = lookup(field, px, py, ox, oy, scale) - object_radius
         if rough < min(d, least):
-            e = _points_clearance(field, object_points, px, py, theta + offset[2], ox, oy, scale)
+            e = points_clearance(field, object_points, px, py, theta + offset[2], ox, oy, scale)
             d = min(d, e)
         least = min(least, d)
         if least < needed:
@@ -106,12 +107,7 @@ class PushScene:
         self.shape = item.geometry
         self.sides = push_sides(robot, item, settings.friction_trust)
         self._object_points = self.shape.dense_outline(_OUTLINE_SPACING)
-        outline = robot.outline
-        dense = []
-        for a, b in zip(outline, np.roll(outline, -1, axis=0), strict=True):
-            n = max(1, int(np.ceil(np.hypot(*(b - a)) / _OUTLINE_SPACING)))
-            dense.append(a + np.arange(n)[:, None] / n * (b - a))
-        self._robot_points = np.vstack(dense)
+        self._robot_points = densified(robot.outline, _OUTLINE_SPACING)
 
     def object_clearance(self, pose: Array) -> float:
         """[m] of the object at a pose ``(3,)``; 0 when it overlaps an obstacle."""

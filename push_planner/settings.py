@@ -16,12 +16,21 @@ class PlannerSettings:
     rrt_range: float = bounded(0.3, low=0.02, high=5.0, doc="[m] longest RRT* extension")
     waypoint_spacing: float = bounded(0.3, low=0.02, high=5.0, doc="[m] between waypoints on Gamma")
     heading_offsets: tuple[float, ...] = (0.0, 0.5, -0.5, 1.0, -1.0)
-    lateral_offsets: tuple[float, ...] = (0.0, 0.25, -0.25)
+    lateral_offsets: tuple[float, ...] = (0.0, 0.25, -0.25, 0.5, -0.5)
     run_lengths: tuple[float, ...] = (0.15, 0.3, 0.6)
-    successor_waypoints: int = bounded(
-        2, low=1, high=50, doc="waypoints with a feasible push before Algorithm 2 stops looking"
+    heuristic_weight: float = bounded(
+        4.0, low=1.0, high=100.0, doc="of the first search; halved in each further round"
     )
-    max_expansions: int = bounded(60, low=1, high=100000, doc="nodes that A* may expand")
+    max_expansions: int = bounded(
+        400, low=1, high=100000, doc="of A* along one guide path, by one waypoint each"
+    )
+    total_expansions: int = bounded(
+        1000, low=1, high=1000000, doc="of all searches until there is a plan"
+    )
+    improvement_expansions: int = bounded(
+        200, low=0, high=1000000, doc="of all searches after the first plan"
+    )
+    push_cost: float = bounded(0.05, low=0.0, high=10.0, doc="[m] added for the stop of each push")
     side_change_cost: float = bounded(0.3, low=0.0, high=10.0, doc="[m] added for a change of side")
     friction_trust: float = bounded(
         0.75, low=0.1, high=1.0, doc="fraction of the stable curvature that plans may use"

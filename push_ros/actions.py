@@ -26,8 +26,11 @@ class GoalServer:
     """An action server for one goal at a time.
 
     check: raises an exception whose text is logged when the goal must be rejected.
-    start: called with the goal's request. cancel: called when the goal shall end; the owner answers
-    with ``finish``. preempted: result for a goal that a new one replaces.
+    refuse: result for a goal that is accepted only to be told why it cannot be; None where it can.
+    A goal that is rejected or refused leaves the one under way alone.
+    preempt: called when a new goal replaces the one under way, which the owner ends with
+    ``finish``. start: called with the new goal's request. cancel: called when the goal under way
+    shall end; the owner answers with ``finish``.
     """
 
     def __init__(
@@ -39,12 +42,12 @@ class GoalServer:
         check: Callable[[Any], None],
         start: Callable[[Any], None],
         cancel: Callable[[], None],
-        preempted: Callable[[], Any],
+        preempt: Callable[[], None],
+        refuse: Callable[[Any], Any] = lambda request: None,
     ) -> None:
         self._node = node
-        self._action = action
         self._check, self._start, self._cancel = check, start, cancel
-        self._preempted = preempted
+        self._preempt, self._refuse = preempt, refuse
         self._handle: Any = None
         self._server = _Server(
             node,
@@ -71,10 +74,14 @@ class GoalServer:
         return GoalResponse.ACCEPT
 
     def _on_accepted(self, handle: Any) -> None:
-        if self._handle is not None:
-            self.finish(self._preempted(), success=False)
-        self._handle = handle
         handle.execute()
+        refusal = self._refuse(handle.request)
+        if refusal is not None:
+            self._server.deliver(handle, lambda h: self._deliver(h, refusal, False))
+            return
+        if self._handle is not None:
+            self._preempt()
+        self._handle = handle
         self._start(handle.request)
 
     def _on_cancel(self, handle: Any) -> CancelResponse:

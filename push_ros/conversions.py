@@ -1,7 +1,6 @@
 """Between messages and the project's types: ``x_to_ros`` and ``x_from_ros``, free functions."""
 
 import array
-import math
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,7 @@ from push_msgs.msg import PlanStatistics as StatisticsMessage
 from push_msgs.msg import PushPlan as PlanMessage
 from push_msgs.msg import PushSegment as SegmentMessage
 from push_msgs.msg import Trajectory as TrajectoryMessage
-from push_ros.validation import FRAME, InvalidMessage, finite, planar_pose
+from push_ros.validation import FRAME, InvalidMessage, check_frame, finite, planar_pose
 
 
 def time_to_ros(seconds: float) -> Time:
@@ -126,12 +125,13 @@ def grid_to_ros(grid: OccupancyGrid, seconds: float) -> GridMessage:
 
 def grid_from_ros(message: GridMessage) -> OccupancyGrid:
     """nav_msgs/OccupancyGrid to a grid; unknown cells count as occupied."""
+    check_frame(message.header.frame_id, "the map")
     info = message.info
     rows, columns = int(info.height), int(info.width)
     data = np.asarray(message.data, dtype=np.int8)
     if rows < 3 or columns < 3 or data.size != rows * columns:
         raise InvalidMessage(f"a map of {rows} x {columns} cells with {data.size} values")
-    if not (math.isfinite(info.resolution) and info.resolution > 0.0):
+    if not 1e-3 <= info.resolution <= 10.0:
         raise InvalidMessage(f"a map with a resolution of {info.resolution} m")
     q = info.origin.orientation
     finite((info.origin.position.x, info.origin.position.y, q.z, q.w), "the map's origin")

@@ -1,8 +1,11 @@
 """Maps in the map_server format: a YAML file and a PGM or PNG image beside it. No ROS here."""
 
+import base64
 import math
+from binascii import Error as Base64Error
 from collections.abc import Mapping
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Any, Literal
 
@@ -13,6 +16,7 @@ from PIL import Image, UnidentifiedImageError
 from push_model.occupancy import MapSpec, OccupancyGrid
 from push_model.settings import SettingsError, bounded, from_mapping
 
+_DATA = "data:image/png;base64,"
 _MAX_CELLS = 4_000_000
 
 
@@ -65,10 +69,17 @@ def load_map(values: Any, where: str, folder: Path | None = None) -> MapSpec:
     if isinstance(values, Mapping) and isinstance(values.get("negate"), bool):
         values = {**values, "negate": int(values["negate"])}
     spec = from_mapping(MapFile, values, where)
-    path = Path(spec.image)
-    if not path.is_absolute() and folder is not None:
-        path = folder / path
-    grey, transparent = _pixels(path, where)
+    source: Path | BytesIO
+    if spec.image.startswith(_DATA):
+        try:
+            source = BytesIO(base64.b64decode(spec.image[len(_DATA) :], validate=True))
+        except (Base64Error, ValueError) as error:
+            raise SettingsError(f"{where}.image: no base64 data: {error}") from None
+    else:
+        source = Path(spec.image)
+        if not source.is_absolute() and folder is not None:
+            source = folder / source
+    grey, transparent = _pixels(source, where)
     if spec.mode == "raw":
         occupied = grey >= 50  # 0-100 is the occupancy itself, more is unknown
     else:
@@ -81,12 +92,26 @@ def load_map(values: Any, where: str, folder: Path | None = None) -> MapSpec:
     occupied[[0, -1], :] = True
     occupied[:, [0, -1]] = True
     if occupied.all():
-        raise SettingsError(f"{where}.image: {path} has no free cell; see negate and free_thresh")
+        raise SettingsError(f"{where}.image: {source} has no free cell; see negate and free_thresh")
     grid = OccupancyGrid(occupied, spec.resolution, np.array(spec.origin[:2]))
     return MapSpec(grid, spec.wall_height, spec.wall_friction)
 
 
-def _pixels(path: Path, where: str) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def map_to_mapping(spec: MapSpec) -> dict[str, Any]:
+    """The map as YAML values of its own, the image inside."""
+    pixels = np.where(spec.grid.occupied[::-1], 0, 254).astype(np.uint8)
+    data = BytesIO()
+    Image.fromarray(pixels).save(data, "png")
+    return {
+        "image": _DATA + base64.b64encode(data.getvalue()).decode(),
+        "resolution": spec.grid.resolution,
+        "origin": [*spec.grid.origin.tolist(), 0.0],
+        "wall_height": spec.wall_height,
+        "wall_friction": spec.wall_friction,
+    }
+
+
+def _pixels(path: Path | BytesIO, where: str) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Grey values 0-255 and transparency, both ``(rows, columns)``, the first row on top."""
     try:
         with Image.open(path) as image:

@@ -1,6 +1,7 @@
 """Starting, spinning and stopping nodes."""
 
 import contextlib
+import ctypes
 import fcntl
 import os
 import signal
@@ -13,6 +14,7 @@ from typing import IO, Any
 
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError
+from rclpy.exceptions import ParameterException
 from rclpy.experimental import EventsExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
@@ -34,6 +36,11 @@ def prepare_environment(environment: dict[str, str] | None = None) -> dict[str, 
     return env  # type: ignore[return-value]
 
 
+def die_with_parent() -> None:
+    """Linux: ask for SIGTERM when the parent process ends, however it ends."""
+    ctypes.CDLL(None).prctl(1, signal.SIGTERM)
+
+
 def claim_domain() -> int:
     """Set ROS_DOMAIN_ID to one that no other run on this machine has claimed; returns it.
 
@@ -43,7 +50,10 @@ def claim_domain() -> int:
     for offset in range(100):
         domain = 1 + (os.getpid() + offset) % 100
         path = Path(tempfile.gettempdir()) / f"planar_push_domain_{domain}.lock"
-        file = path.open("a")
+        try:
+            file = path.open("a")
+        except OSError:  # somebody else's
+            continue
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
@@ -60,7 +70,6 @@ class Spinner:
 
     def __init__(self, nodes: Sequence[Node]) -> None:
         self.nodes = list(nodes)
-        self.garbage = 0
         self.executor = EventsExecutor()
         for node in self.nodes:
             self.executor.add_node(node)
@@ -73,7 +82,6 @@ class Spinner:
             # Bytes that are no message of the topic's type: rclpy raises out of the executor.
             if not any(word in str(error).lower() for word in ("take", "deserial", "convert")):
                 raise
-            self.garbage += 1
             get_logger("planar_push").warning(f"a message could not be read: {error}")
 
     def until(self, condition: Callable[[], bool], limit: float) -> bool:
@@ -119,7 +127,7 @@ def run_node(make: Callable[[], Node], arguments: Sequence[str] | None = None) -
         stop = getattr(node, "stop", None)
         if stop is not None:
             stop()
-    except SettingsError as error:
+    except (SettingsError, ParameterException) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:

@@ -4,7 +4,7 @@ import importlib.util
 import math
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,20 +15,15 @@ from push_model.arrays import Array
 from push_model.occupancy import MapSpec, OccupancyGrid, rasterise
 from push_model.settings import SettingsError, from_mapping
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
-from push_ros.map_file import is_map, load_map
+from push_ros.map_file import is_map, load_map, map_to_mapping
 
-
-@dataclass(frozen=True)
-class Placed:
-    """A robot or an object of a scenario: what it is and its start pose ``(3,)``."""
-
-    type: str
-    start: Array
+NODES = ("bridge", "planner", "controller", "supervisor")
+"""Nodes that a scenario may have parameters for."""
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """parameters: node name to a mapping of that node's settings; goal ``(3,)``; text: the YAML."""
+    """parameters: node name to a mapping of that node's settings; goal ``(3,)``."""
 
     name: str
     environment: EnvironmentSpec | MapSpec
@@ -36,7 +31,23 @@ class Scenario:
     objects: dict[str, tuple[ObjectSpec, Array]]
     goal: Array | None
     parameters: dict[str, dict[str, Any]]
-    text: str
+
+    @property
+    def text(self) -> str:
+        """The scenario as YAML that needs no other file."""
+        environment = (
+            map_to_mapping(self.environment)
+            if isinstance(self.environment, MapSpec)
+            else asdict(self.environment)
+        )
+        values = {
+            "environment": environment,
+            "robots": _bodies_to_mapping(self.robots),
+            "objects": _bodies_to_mapping(self.objects),
+            "goal": None if self.goal is None else self.goal.tolist(),
+            "parameters": self.parameters,
+        }
+        return yaml.safe_dump(values, sort_keys=False)
 
     @property
     def grid(self) -> OccupancyGrid:
@@ -64,6 +75,13 @@ class Scenario:
                 inner = inner.setdefault(part, {})
             inner[last] = value
         return replace(self, parameters={**self.parameters, node: values})
+
+
+def _bodies_to_mapping(bodies: Mapping[str, tuple[Any, Array]]) -> dict[str, Any]:
+    return {
+        name: {"type": asdict(spec), "start": start.tolist()}
+        for name, (spec, start) in bodies.items()
+    }
 
 
 def _pick(name: str, known: Mapping[str, Any], kind: str) -> tuple[str, Any]:
@@ -156,6 +174,11 @@ def scenario_from_mapping(
         isinstance(v, Mapping) for v in parameters.values()
     ):
         raise SettingsError(f"{where}.parameters: expected node names with mappings")
+    for node in parameters:
+        if node not in NODES:
+            raise SettingsError(
+                f"{where}.parameters: unknown node '{node}'; expected one of: {', '.join(NODES)}"
+            )
     return Scenario(
         name,
         environment,
@@ -163,7 +186,6 @@ def scenario_from_mapping(
         objects,
         None if goal is None else _pose(goal, f"{where}.goal"),
         {str(k): dict(v) for k, v in parameters.items()},
-        yaml.safe_dump(dict(values), sort_keys=False),
     )
 
 
@@ -194,18 +216,16 @@ def _bodies(
     result = {}
     for name, entry in values.items():
         here = f"{where}.{name}"
-        if not str(name).isidentifier():
+        if not (str(name).isascii() and str(name).isidentifier()):
             raise SettingsError(f"{here}: a name must be letters, digits and underscores")
         if not isinstance(entry, Mapping) or not {"type", "start"} <= set(entry):
             raise SettingsError(f"{here}: expected keys 'type' and 'start', got {entry!r}")
-        spec = entry["type"]
         overrides = {k: v for k, v in entry.items() if k not in ("type", "start")}
-        if isinstance(spec, str) and overrides:
-            spec = {**read_yaml(find(kind, spec)), **overrides}
-        elif overrides:
-            spec = {**spec, **overrides}
+        spec, source, _ = _read(kind, entry["type"], f"{here}.type", folder)
+        if not isinstance(spec, Mapping):
+            raise SettingsError(f"{source}: expected a name or a mapping, got {spec!r}")
         result[str(name)] = (
-            from_mapping(cls, *_read(kind, spec, here, folder)[:2]),
+            from_mapping(cls, {**spec, **overrides}, here if overrides else source),
             _pose(entry["start"], f"{here}.start"),
         )
     return result

@@ -78,6 +78,12 @@ class SupervisorSettings:
     node_timeout: float = bounded(
         20.0, low=0.5, high=600.0, doc="[s] wall time to wait for a lost node to return"
     )
+    answer_timeout: float = bounded(
+        10.0, low=0.5, high=600.0, doc="[s] wall time without a sign of the planner: ask again"
+    )
+    pose_timeout: float = bounded(
+        5.0, low=0.2, high=60.0, doc="[s] wall time without poses until they count as lost"
+    )
 
 
 class Event(IntEnum):
@@ -95,6 +101,7 @@ class Event(IntEnum):
     MOTION_FAILED = 10  # message, lost: whether the controller itself is gone
     DISPLACED = 11  # message
     CLOCK_RESET = 12
+    ABORT = 13  # code, message: end the job for a reason of the owner's
 
 
 class Command(IntEnum):
@@ -120,6 +127,7 @@ class Machine:
     """One job at a time.
 
     at_goal: tells whether the object is within tolerance of a goal now, and describes the error.
+    pushes, replans: of this job so far.
     """
 
     settings: SupervisorSettings
@@ -130,6 +138,7 @@ class Machine:
     segments: list[Any] = field(default_factory=list)
     index: int = 0
     replans: int = 0
+    pushes: int = 0
     error: JobError = JobError.NONE
     busy: bool = False
 
@@ -156,6 +165,7 @@ class Machine:
             Event.MOTION_FAILED: (_MOVING, self._on_motion_failed),
             Event.DISPLACED: (frozenset({State.POSITIONING, State.APPROACH}), self._on_displaced),
             Event.CLOCK_RESET: (frozenset(State), self._on_clock_reset),
+            Event.ABORT: (frozenset(State), self._on_abort),
         }
 
     @property
@@ -201,7 +211,7 @@ class Machine:
             self._finish(JobError.PREEMPTED, "a new goal replaces this one")
         self.goal, self.busy, self.error = goal, True, JobError.NONE
         self._execute = self.settings.auto_execute and not plan_only
-        self.replans = self._retries = self._losses = 0
+        self.replans = self.pushes = self._retries = self._losses = 0
         self._plan("planning for a new goal")
 
     def _plan(self, reason: str) -> None:
@@ -289,6 +299,7 @@ class Machine:
             self._retries = 0
             self._push()
         elif self.state is State.PUSHING:
+            self.pushes += 1
             following = self.index + 1
             if (
                 following < len(self.segments)
@@ -358,14 +369,15 @@ class Machine:
         self._replan(message)
 
     def _on_cancel(self) -> None:
-        self._halt()
-        if self.busy or self.segments:
-            self._finish(JobError.CANCELED, "canceled")
+        self._on_abort(JobError.CANCELED, "canceled")
 
     def _on_clock_reset(self) -> None:
+        self._on_abort(JobError.CLOCK_RESET, "the clock went back")
+
+    def _on_abort(self, code: JobError, message: str) -> None:
         self._halt()
         if self.busy or self.segments:
-            self._finish(JobError.CLOCK_RESET, "the clock went back")
+            self._finish(code, message)
 
 
 _MOVING = frozenset({State.POSITIONING, State.APPROACH, State.PUSHING, State.DETACHING})

@@ -17,9 +17,10 @@ _OBSTACLE_SPACING = 0.04  # [m] between the round obstacles that stand for a wal
 _REACH = 0.4  # [m] beside a trajectory within which obstacles are handed to the controller
 
 
-def standoff(segment: PushSegment, item: Array, distance: float) -> Array:
+def standoff(segment: PushSegment, item: Array) -> Array:
     """Where the robot waits before it touches the side, the object being at ``item``."""
-    return se2.compose(segment.contact(item), np.array([-distance, 0.0, 0.0]))
+    before_contact = se2.between(segment.robot_start, segment.standoff)
+    return se2.compose(segment.contact(item), before_contact)
 
 
 def approach(

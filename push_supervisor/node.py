@@ -40,7 +40,7 @@ from push_ros.parameters import declare_settings
 from push_ros.pose_tracker import PoseTracker, PoseTrackerSettings, Stamp
 from push_ros.qos import COMMAND, LATCHED, STREAM
 from push_ros.scenario import Scenario, load_scenario
-from push_ros.validation import InvalidMessage, planar_pose, stamped_pose
+from push_ros.validation import FRAME, InvalidMessage, planar_pose, stamped_pose
 from push_supervisor import (
     Command,
     Event,
@@ -59,7 +59,16 @@ _PLAN_ERRORS = {
     PlanPush.Result.GOAL_OCCUPIED: JobError.GOAL_OCCUPIED,
 }
 _RETRY_CODES = (PlanPush.Result.NO_PUSH_SEQUENCE,)
+_ASKS = 3  # times that the planner is asked the same
 _POSE_PERIOD = 0.045  # [s] of the frames that are looked at
+
+
+class GoalRefused(Exception):
+    """A goal that cannot be taken; carries the code."""
+
+    def __init__(self, code: JobError, message: str) -> None:
+        super().__init__(message)
+        self.code = code
 
 
 class SupervisorNode(Node):
@@ -99,8 +108,11 @@ class SupervisorNode(Node):
         self._lost_since: float | None = None
         self._displaced = 0
         self._following = False
-        self._last_sign = 0.0
+        self._last_sign = self._last_sign_wall = 0.0
         self._path_token = 0
+        self._asked: tuple[Command, dict[str, Any]] | None = None  # of the planner, not answered
+        self._asked_wall = 0.0
+        self._asks = 0
         self._queue: list[tuple[Event, dict[str, Any]]] = []
         self._handling = False
         self._waiting: tuple[Command, dict[str, Any]] | None = None
@@ -123,11 +135,12 @@ class SupervisorNode(Node):
             MoveObject,
             "/move_object",
             check=lambda request: None,
-            start=self._on_job,
-            cancel=self._cancel,
-            preempted=lambda: MoveObject.Result(
-                error_code=MoveObject.Result.PREEMPTED, error_msg="a new goal replaces this one"
+            refuse=self._refuse_job,
+            preempt=self._preempt,
+            start=lambda request: self._take_goal(
+                stamped_pose(request.goal, "the goal"), bool(request.plan_only)
             ),
+            cancel=self._cancel,
         )
         self.create_service(Trigger, "/supervisor/execute", self._on_execute)
         self.create_service(Trigger, "/supervisor/cancel", self._on_cancel)
@@ -153,11 +166,23 @@ class SupervisorNode(Node):
             0.1, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
 
+    @property
+    def ready(self) -> bool:
+        """Whether a goal could be worked on: the map is known, and the other nodes are there."""
+        return (
+            self._grid is not None
+            and self._plan_client.ready
+            and self._follow_client.ready
+            and self._path_client.service_is_ready()
+        )
+
     def _apply(self, settings: SupervisorSettings) -> None:
         if self.machine.busy:
             raise SettingsError("the supervisor is busy; change its parameters when it is idle")
         self.settings = settings
         self.machine.settings = settings
+        if self._grid is not None:
+            self._take_grid(self._grid)
 
     # Inputs
 
@@ -167,50 +192,62 @@ class SupervisorNode(Node):
         except InvalidMessage as error:
             self._diagnostics.refuse("/map", str(error))
             return
+        self._take_grid(grid)
+
+    def _take_grid(self, grid: Grid) -> None:
         self._grid, self._planner = grid, None
         margin = self.settings.obstacle_margin
         self._obstacles = motions.wall_circles(grid, self._robot_spec.body_radius, margin)
 
     def _on_goal_pose(self, message: PoseStamped) -> None:
-        if self._job.active:
-            self._end_job(JobError.PREEMPTED, "a goal on /goal_pose replaces this one")
-        self._take_goal(message, False, "/goal_pose")
-
-    def _on_job(self, request: Any) -> None:
-        if request.object not in ("", self.object):
-            self._refuse(JobError.UNKNOWN_OBJECT, f"unknown object '{request.object}'")
+        try:
+            goal = self._parse_goal(message, "/goal_pose")
+        except GoalRefused as refusal:
+            self._say_no(refusal)
             return
-        self._take_goal(request.goal, bool(request.plan_only), "/move_object")
+        if self._job.active:
+            self._preempt()
+        self._take_goal(goal, False)
 
-    def _take_goal(self, message: PoseStamped, plan_only: bool, topic: str) -> None:
-        """Check a goal before anything that is under way is given up for it."""
+    def _refuse_job(self, request: Any) -> Any:
+        """The result for a job that cannot be: it never touches the one under way."""
+        try:
+            if request.object not in ("", self.object):
+                raise GoalRefused(JobError.UNKNOWN_OBJECT, f"unknown object '{request.object}'")
+            self._parse_goal(request.goal, "/move_object")
+        except GoalRefused as refusal:
+            self._say_no(refusal)
+            return MoveObject.Result(error_code=int(refusal.code), error_msg=str(refusal))
+        return None
+
+    def _parse_goal(self, message: PoseStamped, topic: str) -> Array:
+        """The goal ``(3,)``; raises GoalRefused."""
         try:
             goal = stamped_pose(message, "the goal")
         except InvalidMessage as error:
             self._diagnostics.refuse(topic, str(error))
-            frame = message.header.frame_id != "map"
+            frame = message.header.frame_id != FRAME
             code = JobError.UNKNOWN_FRAME if frame else JobError.INVALID_GOAL
-            self._refuse(code, f"goal refused: {error}")
-            return
+            raise GoalRefused(code, f"goal refused: {error}") from None
         if self._grid is not None and not self._grid.contains(goal[0], goal[1]):
-            self._diagnostics.refuse(topic, "the goal lies outside the map")
-            self._refuse(
-                JobError.OUTSIDE_MAP,
-                f"goal refused: ({goal[0]:.2f}, {goal[1]:.2f}) lies outside the map",
-            )
-            return
-        self._fire(Event.GOAL, goal=goal, plan_only=plan_only)
+            text = f"({goal[0]:.2f}, {goal[1]:.2f}) lies outside the map"
+            self._diagnostics.refuse(topic, text)
+            raise GoalRefused(JobError.OUTSIDE_MAP, f"goal refused: {text}")
+        return goal
 
-    def _refuse(self, code: JobError, reason: str) -> None:
-        """Say no to a goal; a job that is under way goes on."""
-        self.get_logger().warning(reason)
-        if self.machine.busy and self._job.active:
+    def _say_no(self, refusal: "GoalRefused") -> None:
+        self.get_logger().warning(str(refusal))
+        if self.machine.busy:  # a job that is under way goes on, and so does its state
+            self._publish_state(str(refusal))
             return
-        self.machine.error = code
-        if not self.machine.busy:
-            self.machine.reason = reason
-        self._end_job(code, reason)
-        self._publish_state(reason)
+        self.machine.error, self.machine.reason = refusal.code, str(refusal)
+        self._publish_state()
+
+    def _preempt(self) -> None:
+        self._fire(Event.ABORT, code=JobError.PREEMPTED, message="a new goal replaces this one")
+
+    def _take_goal(self, goal: Array, plan_only: bool) -> None:
+        self._fire(Event.GOAL, goal=goal, plan_only=plan_only)
 
     def _on_execute(self, request: Any, response: Any) -> Any:
         response.success = self.machine.plan_ready
@@ -241,8 +278,12 @@ class SupervisorNode(Node):
         self._take_poses(message)
 
     def _take_poses(self, message: NamedPoses) -> None:
+        if message.header.frame_id != FRAME:
+            self._diagnostics.refuse("/poses", f"frame '{message.header.frame_id}'")
+            return
         verdict = self._poses.begin(time_from_ros(message.header.stamp))
-        if message.header.frame_id != "map" or verdict is Stamp.REFUSED:
+        if verdict is Stamp.REFUSED:
+            self._diagnostics.refuse("/poses", "its stamp is zero or not newer than the last")
             return
         self._last_wall = time.monotonic()
         for named in message.poses:
@@ -254,7 +295,7 @@ class SupervisorNode(Node):
         if verdict is Stamp.RESET:
             self._fire(Event.CLOCK_RESET)
         self._ticks += 1
-        self._heartbeat_publisher.publish(Header(stamp=message.header.stamp, frame_id="map"))
+        self._heartbeat_publisher.publish(Header(stamp=message.header.stamp, frame_id=FRAME))
         self._retry_waiting()
         if self._ticks % 2 == 0:
             self._watch_displacement()
@@ -298,21 +339,22 @@ class SupervisorNode(Node):
             while self._queue:
                 event, payload = self._queue.pop(0)
                 before = (self.machine.state, self.machine.reason)
-                for command, arguments in self.machine.handle(event, **payload):
+                commands = self.machine.handle(event, **payload)
+                for command, arguments in commands:
                     self._carry_out(command, arguments)
-                if (self.machine.state, self.machine.reason) != before:
+                ended = any(command is Command.FINISH for command, _ in commands)
+                if ended or (self.machine.state, self.machine.reason) != before:
                     self._publish_state()
         finally:
             self._handling = False
 
     def _carry_out(self, command: Command, arguments: dict[str, Any]) -> None:
-        self._waiting = None
+        self._waiting = self._asked = None
         if command in (Command.STOP, Command.CANCEL_PLAN):
-            self._plan_client.forget()
-            self._follow_client.forget()
-            self._following = False
-            self._path_token += 1
+            self._let_go()
         elif command is Command.FINISH:
+            self._let_go()
+            self._asks = 0
             self._end_job(arguments["code"], arguments["message"])
         else:
             self._waiting = (command, arguments)
@@ -330,7 +372,7 @@ class SupervisorNode(Node):
             Command.OFFER: lambda: True,
             Command.PATH: self._path_client.service_is_ready,
         }.get(command, lambda: self._follow_client.ready)
-        robot, item = self._poses.pose(self.robot), self._poses.pose(self.object)
+        robot, item = self._pose(self.robot), self._pose(self.object)
         if robot is not None and item is not None and server_ready():
             self._waiting = None
             self._lost_since = None
@@ -341,29 +383,59 @@ class SupervisorNode(Node):
         if now - self._lost_since > self.settings.node_timeout:
             self._waiting = self._lost_since = None
             poses = robot is None or item is None
-            self._end_waiting(
-                "no poses of robot and object" if poses else "a node does not answer",
-                JobError.POSES_STALE if poses else JobError.NODE_LOST,
+            self._fire(
+                Event.ABORT,
+                code=JobError.POSES_STALE if poses else JobError.NODE_LOST,
+                message="no poses of robot and object" if poses else "a node does not answer",
             )
 
-    def _end_waiting(self, message: str, code: JobError) -> None:
-        self._fire(Event.CANCEL)
-        self.machine.error, self.machine.reason = code, message
-        self._publish_state()
+    def _pose(self, name: str) -> Array | None:
+        """The pose ``(3,)`` of a body, None when it is not known now."""
+        silence = time.monotonic() - self._last_wall
+        return None if silence > self.settings.pose_timeout else self._poses.pose(name)
 
     def _watch_servers(self) -> None:
-        """A controller that dies in the middle of a motion never answers.
+        """A node that dies in the middle of its work never answers.
 
-        Its action server stays in the graph for seconds, and one started in its place looks the
-        same: only its feedback tells. Measured in pose time, which stands still with the poses.
+        Its servers stay in the graph for seconds, and those of one started in its place look the
+        same: only feedback tells. That of the controller is measured in pose time, which stands
+        still with the poses, and in wall time, for a simulation that runs fast; that of the planner
+        in wall time, which it works in.
         """
-        silence = self._poses.stamp - self._last_sign
+        wall = time.monotonic() - self._last_sign_wall
+        silence = min(self._poses.stamp - self._last_sign, wall)
         if self._following and silence > self.settings.controller_timeout:
             self._following = False
             self._follow_client.forget()
             self._fire(Event.MOTION_FAILED, message="the controller is gone", lost=True)
+        if self._asked is None:
+            return
+        if time.monotonic() - self._asked_wall > self.settings.answer_timeout:
+            command, arguments = self._asked
+            self._let_go()
+            self._asked = None
+            if self._asks >= _ASKS:
+                self._fire(
+                    Event.ABORT, code=JobError.NODE_LOST, message="the planner does not answer"
+                )
+            else:
+                self.get_logger().warning("the planner does not answer; asking again")
+                self._waiting = (command, arguments)
+
+    def _let_go(self) -> None:
+        """Cancel what the other nodes are doing for this one, and ignore late answers."""
+        self._plan_client.forget()
+        self._follow_client.forget()
+        self._following = False
+        self._path_token += 1
+
+    def _answered(self) -> None:
+        self._asked, self._asks = None, 0
 
     def _send(self, command: Command, arguments: dict[str, Any], robot: Array, item: Array) -> None:
+        if command in (Command.PLAN, Command.PATH):
+            self._asked, self._asked_wall = (command, arguments), time.monotonic()
+            self._asks += 1
         if command is Command.PLAN:
             offer: PushSegment | None = arguments["start"]
             self._request_plan(item if offer is None else offer.object_end, arguments["goal"])
@@ -393,7 +465,11 @@ class SupervisorNode(Node):
             goal=pose_stamped_to_ros(goal, now),
         )
 
+        def sign(feedback: Any) -> None:
+            self._asked_wall = time.monotonic()
+
         def done(result: Any) -> None:
+            self._answered()
             if result is None:
                 self._fire(
                     Event.PLAN_FAILED,
@@ -412,7 +488,7 @@ class SupervisorNode(Node):
                     retry=result.error_code in _RETRY_CODES,
                 )
 
-        self._plan_client.send(request, done)
+        self._plan_client.send(request, done, sign)
 
     def _take_plan(self, plan: PushPlan) -> None:
         try:
@@ -441,7 +517,7 @@ class SupervisorNode(Node):
         self._fire(Event.OFFERS, segments=found)
 
     def _request_path(self, robot: Array, item: Array, segment: PushSegment) -> None:
-        standoff = motions.standoff(segment, item, self._planner_settings.standoff)
+        standoff = motions.standoff(segment, item)
         reach = self._object_radius + self._robot_spec.footprint_radius
         request = PlanRobotPath.Request(
             start=pose_to_ros(robot),
@@ -454,6 +530,7 @@ class SupervisorNode(Node):
         def done(future: Any) -> None:
             if token != self._path_token:
                 return
+            self._answered()
             answer = future.result()
             if answer is None or answer.error_code != PlanRobotPath.Response.NONE:
                 text = "no answer" if answer is None else answer.message
@@ -503,15 +580,16 @@ class SupervisorNode(Node):
                 self._fire(Event.MOTION_FAILED, message=result.error_msg)
 
         def sign(feedback: Any) -> None:
-            self._last_sign = self._poses.stamp
+            self._last_sign, self._last_sign_wall = self._poses.stamp, time.monotonic()
 
-        self._following, self._last_sign = True, self._poses.stamp
+        self._following = True
+        sign(None)
         self._follow_client.send(goal, done, sign)
 
     # Outputs
 
     def _errors(self, goal: Any) -> tuple[float, float]:
-        item = self._poses.pose(self.object)
+        item = self._pose(self.object)
         if item is None or goal is None:
             return float("inf"), float("inf")
         local = se2.between(goal, item)
@@ -524,9 +602,6 @@ class SupervisorNode(Node):
         return there, f"{1e3 * way:.1f} mm, {turn:.3f} rad"
 
     def _end_job(self, code: JobError, message: str) -> None:
-        self._plan_client.forget()
-        self._follow_client.forget()
-        self._following = False
         if not self._job.active:
             return
         way, turn = self._errors(self.machine.goal)
@@ -536,16 +611,11 @@ class SupervisorNode(Node):
                 error_msg=message,
                 position_error=way,
                 orientation_error=turn,
-                pushes=self.pushes,
+                pushes=self.machine.pushes,
                 replans=self.machine.replans,
             ),
             success=code is JobError.NONE,
         )
-
-    @property
-    def pushes(self) -> int:
-        """Pushes of the current plan."""
-        return len(self.machine.segments)
 
     def _feedback(self) -> Any:
         way, _ = self._errors(self.machine.goal)
@@ -570,7 +640,7 @@ class SupervisorNode(Node):
             push_count=len(m.segments),
             replans=m.replans,
         )
-        message.header.frame_id = "map"
+        message.header.frame_id = FRAME
         message.header.stamp = pose_stamped_to_ros(np.zeros(3), self._poses.stamp).header.stamp
         if m.goal is not None:
             message.goal = pose_stamped_to_ros(m.goal, self._poses.stamp)
@@ -587,5 +657,5 @@ class SupervisorNode(Node):
             "replans": m.replans,
             "poses refused": self._poses.refused,
             "pose jumps": self._poses.jumps,
-            "warning": "no poses" if self._poses.pose(self.object) is None else "",
+            "warning": "no poses" if self._pose(self.object) is None else "",
         }

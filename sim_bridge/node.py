@@ -120,6 +120,7 @@ class BridgeNode(Node):
         self._capture = MotionCapture(self._capture_settings, self._seed)
         self._last_tick: dict[str, int] = {}
         self._last_wall: dict[str, float] = {}
+        self._commanded = self.commanded()
         self._pace.restart()
         self._lockstep.expect(0, (), time.monotonic())
         self._driving: dict[str, bool] = dict.fromkeys(self._scenario.robots, False)
@@ -175,6 +176,8 @@ class BridgeNode(Node):
                 return
 
     def _on_command(self, robot: str, message: TwistStamped) -> None:
+        if robot not in self._scenario.robots:
+            return  # one that is gone with the last scenario
         v, omega = message.twist.linear.x, message.twist.angular.z
         limit = 10.0 * self._scenario.robots[robot][0].drive.max_speed
         turn_limit = 10.0 * self._scenario.robots[robot][0].drive.max_turn_rate
@@ -188,7 +191,7 @@ class BridgeNode(Node):
         stamp = round(time_from_ros(message.header.stamp) / self.period)
         allowed = self.settings.command_timeout / self.period
         allowed += self._capture_settings.latency / self.period
-        if stamp > self.tick or stamp < self.tick - allowed:
+        if stamp <= 0 or not self.tick - allowed <= stamp <= self.tick:
             self._diagnostics.refuse(
                 topic, f"stamp {stamp * self.period:.2f} s at {self.time:.2f} s is not a fresh one"
             )
@@ -197,11 +200,11 @@ class BridgeNode(Node):
         self.world.command(robot, v, omega)
         self._driving[robot] = v != 0.0 or omega != 0.0
         self._last_tick[robot], self._last_wall[robot] = self.tick, time.monotonic()
-        if self.settings.lockstep and self.running and not self._paused:
+        if self.settings.lockstep and self.running:
             if robot not in self._commanded:
                 self._commanded = self.commanded()
             self._lockstep.answer(stamp, robot)
-            if self._lockstep.ready:
+            if self._lockstep.ready:  # while paused it is kept for later
                 self._advance()
 
     def _stop(self, robot: str) -> None:

@@ -15,11 +15,11 @@ from push_model.arrays import Array
 from push_model.limit_surface import uniform_pressure_radius
 from push_model.shapes import Shape
 from push_model.specs import ObjectSpec
+from sim_bridge.collision_groups import BODY_GROUP, FLOOR_GROUP
 
 _CLEARANCE = 0.003  # [m] of the body above the floor
 _FOOT_RADIUS = 0.005  # [m]
 _HULL_MARGIN = 0.001  # [m] by which PyBullet lets a convex hull stick out
-FLOOR_GROUP, BODY_GROUP = 2, 1
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,11 @@ import pybullet as pb
 
 from push_model.arrays import Array
 from push_model.specs import RobotSpec
+from sim_bridge.collision_groups import BODY_GROUP, FLOOR_GROUP
 
 WHEELS = (0, 1)
 """Link and joint indices of the left and the right wheel."""
 BODY = -1
-FLOOR_GROUP, BODY_GROUP = 2, 1
 _CASTER_CLEARANCE = 2e-4  # [m] above the floor at rest; the robot leans on one caster at a time
 
 

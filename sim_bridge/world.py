@@ -10,10 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 import pybullet as pb
 
+from push_model import se2
 from push_model.arrays import Array
 from push_model.occupancy import MapSpec
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
-from sim_bridge.object_body import BODY_GROUP, FLOOR_GROUP, Feet, ObjectBody
+from sim_bridge.collision_groups import BODY_GROUP, FLOOR_GROUP
+from sim_bridge.object_body import Feet, ObjectBody
 from sim_bridge.robot_body import BODY, RobotBody
 from sim_bridge.settings import PhysicsSettings
 
@@ -231,8 +233,7 @@ class World:
         result = {}
         for name, body in self._bodies.items():
             (x, y, _), q = pb.getBasePositionAndOrientation(body.body, physicsClientId=self._client)
-            yaw = math.atan2(2.0 * (q[3] * q[2] + q[0] * q[1]), 1.0 - 2.0 * (q[1] ** 2 + q[2] ** 2))
-            result[name] = np.array([x, y, yaw])
+            result[name] = np.array([x, y, se2.yaw_from_quaternion(*q)])
         return result
 
     def velocity(self, name: str) -> Array:

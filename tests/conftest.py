@@ -1,10 +1,12 @@
 """Shared by all tests: small scenarios, and ROS contexts that leave nothing behind."""
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
+from PIL import Image
 
 from push_ros.process import claim_domain, prepare_environment
-from push_ros.scenario import load_scenario
+from push_ros.scenario import config_directory, load_scenario
 
 claim_domain()  # every run of the tests has a domain of its own
 prepare_environment()
@@ -40,3 +42,18 @@ def ros():
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     yield
     rclpy.try_shutdown()
+
+
+@pytest.fixture
+def room(tmp_path):
+    """A scenario file beside a map of map_server: ``short``, in a room of 2 m x 0.7 m."""
+    pixels = np.full((60, 110), 254, dtype=np.uint8)
+    pixels[:, :4] = pixels[:, -4:] = pixels[:12, :] = pixels[-12:, :] = 0
+    Image.fromarray(pixels).save(tmp_path / "room.pgm")
+    (tmp_path / "room.yaml").write_text(
+        "image: room.pgm\nresolution: 0.02\norigin: [-1.1, -0.6, 0.0]\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.25\n"
+    )
+    text = (config_directory() / "scenarios" / "short.yaml").read_text()
+    (tmp_path / "in_a_room.yaml").write_text(text.replace(": open", ": room.yaml"))
+    return str(tmp_path / "in_a_room.yaml")

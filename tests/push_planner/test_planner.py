@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from push_model import se2
+from push_model import CurvatureLimits, se2
 from push_model.occupancy import rasterise
 from push_model.specs import BoxSpec, CircleSpec, EnvironmentSpec
 from push_planner import (
@@ -15,8 +15,11 @@ from push_planner import (
     PushPlanner,
     plan_robot_path,
     preemptive_pushes,
+    shortest_push_curve,
 )
 from push_planner.guide_path import guide_paths, path_cost, shortest_path
+from push_planner.push_search import worth_trying
+from push_ros.scenario import load_scenario, scenario_names
 
 START, GOAL = np.array([-1.15, -0.7, 0.0]), np.array([1.3, 0.75, 0.0])
 
@@ -76,13 +79,52 @@ def test_plans_only_get_better(planner):
 
 
 def test_change_of_side_where_one_push_cannot_do(robot, box):
-    """Straight across without turning: only pushes on two sides get there."""
+    """Straight across without turning, on less way than an S would take: two sides in turn."""
     open_space = PushPlanner(PlannerSettings(), rasterise(EnvironmentSpec((3.0, 2.0))), robot, box)
-    start, goal = np.array([-0.6, -0.5, 0.0]), np.array([0.3, 0.5, np.pi / 2])
-    plan = open_space.solve(start, np.array([0.3, 0.5, 0.0]))
-    assert plan.segments[-1].object_end == pytest.approx([0.3, 0.5, 0.0])
-    turned = open_space.solve(start, goal)
-    assert turned.segments[-1].object_end == pytest.approx(goal)
+    start, goal = np.array([-0.2, -0.4, 0.0]), np.array([0.2, 0.4, 0.0])
+    plan = open_space.solve(start, goal)
+    assert plan.segments[-1].object_end == pytest.approx(goal)
+    assert len({s.side for s in plan.segments}) >= 2
+    for before, after in zip(plan.segments, plan.segments[1:], strict=False):
+        assert before.object_end == pytest.approx(after.object_start)
+
+
+@pytest.mark.parametrize("name", [n for n in scenario_names() if n.startswith("env")])
+def test_every_scenario_has_a_plan_that_later_ones_do_not_make_longer(name):
+    scenario = load_scenario(name)
+    planner = PushPlanner(
+        PlannerSettings(), scenario.grid, scenario.robot()[1], scenario.object()[1]
+    )
+    start = next(iter(scenario.objects.values()))[1]
+    plans = [p.best for p in planner.plan(start, scenario.goal) if p.best is not None]
+    assert plans[-1].segments[-1].object_end == pytest.approx(scenario.goal)
+    assert plans[-1].segments[0].object_start == pytest.approx(start)
+    assert plans[-1].cost <= plans[0].cost
+
+
+def test_a_waypoint_that_leads_nowhere_hides_no_other(planner):
+    """Environment 1, second target: the pushes that end there from far off need a box that lies
+    turned; Algorithm 2, which looks no further, ends without a plan."""
+    plan = planner.solve(START, np.array([1.3, 0.75, np.pi / 2]))
+    assert len(plan.segments) >= 2 and len({s.side for s in plan.segments}) >= 2
+    assert plan.statistics.nodes_expanded > 20
+
+
+def test_bearings_rule_out_only_pushes_that_must_loop():
+    """The quick test against the solver: what it rules out has no curve without a loop."""
+    random = np.random.default_rng(4)
+    limits = CurvatureLimits(-1.6, 1.2)
+    ruled_out = 0
+    for _ in range(400):
+        start = np.array([0.0, 0.0, random.uniform(-1.5, 1.5)])
+        end = np.array([random.uniform(0.1, 1.5), 0.0, random.uniform(-1.5, 1.5)])
+        if not worth_trying(start[None], end, limits)[0]:
+            ruled_out += 1
+            curve = shortest_push_curve(start, end, limits.minimum, limits.maximum)
+            if curve is not None:
+                heading = curve.sample(400)[1]
+                assert np.ptp(heading) > np.pi
+    assert 100 < ruled_out < 390
 
 
 @pytest.mark.parametrize(

@@ -89,6 +89,30 @@ def test_as_short_as_slsqp_finds_and_never_misses_what_it_finds():
     assert missed == 0 and gaps == 0
 
 
+def test_no_curve_is_missed_that_a_fine_grid_finds_with_room_to_spare():
+    """The feasible k_i, k_f can be a valley narrower than the solver's own grid."""
+    random = np.random.default_rng(9)
+    k = np.geomspace(0.05, 8.0, 60)
+    ki, kf = (m.ravel()[:, None] for m in np.meshgrid(k, k))
+    s = np.linspace(0.0, 1.0, 81)
+    found = 0
+    for _ in range(60):
+        end = finish(
+            np.zeros(3), random.uniform(0.6, 2.0), random.uniform(-1, 1), random.uniform(-1.8, 1.8)
+        )
+        c, d = math.cos(end[2]), math.sin(end[2])
+        a, b = 3 * s**2 - 2 * s, 3 * s**2 - 4 * s + 1
+        x1 = 6 * s * (1 - s) * end[0] + a * kf * c + b * ki
+        y1 = 6 * s * (1 - s) * end[1] + a * kf * d
+        x2 = (6 - 12 * s) * end[0] + (6 * s - 2) * kf * c + (6 * s - 4) * ki
+        y2 = (6 - 12 * s) * end[1] + (6 * s - 2) * kf * d
+        bend = np.abs(x1 * y2 - y1 * x2) / np.hypot(x1, y1) ** 3
+        if bend.max(axis=1).min() <= 1.45:
+            found += 1
+            assert shortest_push_curve(np.zeros(3), end, -1.6, 1.6) is not None, end
+    assert found > 15
+
+
 def test_straight_push_is_straight():
     curve = shortest_push_curve(np.zeros(3), np.array([1.0, 0.0, 0.0]), -0.1, 0.1)
     assert curve.length == pytest.approx(1.0, abs=1e-4)

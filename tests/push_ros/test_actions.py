@@ -26,7 +26,8 @@ class World:
             check=self.check,
             start=lambda request: self.started.append(request.object),
             cancel=self.on_cancel,
-            preempted=lambda: MoveObject.Result(error_code=311),
+            preempt=lambda: self.server.finish(MoveObject.Result(error_code=311), False),
+            refuse=lambda r: MoveObject.Result(error_code=301) if r.object == "odd" else None,
         )
         self.client = GoalClient(self.node, MoveObject, "/job")
         self.plain = ActionClient(self.node, MoveObject, "/job")
@@ -138,3 +139,18 @@ def test_a_rejected_goal_is_answered_and_starts_nothing(world):
     world.client.send(MoveObject.Goal(object="bad"), results.append)
     assert world.until(lambda: results)
     assert results == [None] and world.started == []
+
+
+def test_a_refused_goal_gets_its_own_result_and_leaves_the_other_alone(world):
+    first, second = [], []
+    future = world.plain.send_goal_async(MoveObject.Goal(object="one"))
+    assert world.until(future.done)
+    future.result().get_result_async().add_done_callback(lambda f: first.append(f.result()))
+    assert world.until(lambda: world.server.active)
+    world.client.send(MoveObject.Goal(object="odd"), second.append)
+    assert world.until(lambda: second)
+    assert second[0].error_code == 301
+    assert world.started == ["one"] and world.server.active and not first
+    world.server.finish(MoveObject.Result(pushes=2), success=True)
+    assert world.until(lambda: first)
+    assert first[0].result.pushes == 2 and first[0].status == GoalStatus.STATUS_SUCCEEDED

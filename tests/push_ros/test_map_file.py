@@ -7,7 +7,7 @@ from PIL import Image
 
 from push_model import SettingsError
 from push_model.occupancy import rasterise
-from push_ros.scenario import load_scenario
+from push_ros.scenario import load_scenario, scenario_from_mapping
 
 FREE, GREY, WALL = 254, 205, 0
 
@@ -71,6 +71,17 @@ def test_transparent_pixels_are_unknown(tmp_path):
     pixels[2, 2, 3] = 0
     grid = load_scenario(write(tmp_path, pixels, "png")).grid
     assert grid.occupied[2, 2] and not grid.occupied[2, 1]
+
+
+def test_a_map_can_be_carried_inside_a_scenario(tmp_path):
+    scenario = load_scenario(write(tmp_path, room()))
+    again = scenario_from_mapping(yaml.safe_load(scenario.text), "room", "bag")
+    assert np.array_equal(again.grid.occupied, scenario.grid.occupied)
+    assert again.grid.extent == pytest.approx(scenario.grid.extent)
+    broken = yaml.safe_load(scenario.text)
+    broken["environment"]["image"] = "data:image/png;base64,!!"
+    with pytest.raises(SettingsError, match="image: no base64"):
+        scenario_from_mapping(broken, "room", "bag")
 
 
 def test_rectangles_cover_the_occupied_cells_once(tmp_path):

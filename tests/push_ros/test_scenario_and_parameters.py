@@ -8,7 +8,12 @@ from hypothesis import strategies as st
 
 from push_model import SettingsError
 from push_model.occupancy import rasterise
-from push_ros.scenario import load_scenario, scenario_from_mapping, scenario_names
+from push_ros.scenario import (
+    config_directory,
+    load_scenario,
+    scenario_from_mapping,
+    scenario_names,
+)
 
 GOOD = {
     "environment": "env1",
@@ -39,6 +44,13 @@ def test_every_shipped_scenario_is_sound(name):
         ({"objects": {"r": {"type": "box9", "start": [0, 0, 0]}}}, ["both a robot and an object"]),
         ({"goal": [0, 0, "a"]}, ["goal", "[x, y, theta]"]),
         ({"parameters": {"planner": 3}}, ["parameters"]),
+        ({"parameters": {"planer": {}}}, ["parameters", "unknown node 'planer'", "planner"]),
+        ({"robots": {"r": {"type": 3, "start": [0, 0, 0], "mass": 1}}}, ["r.type", "3"]),
+        ({"robots": {"r\u00f6": {"type": "epuck", "start": [0, 0, 0]}}}, ["letters"]),
+        (
+            {"environment": {"size": [2, 2], "boxes": [{"centre": [0, 0], "size": [0.1, -1]}]}},
+            ["boxes[0]", "size must be positive"],
+        ),
     ],
 )
 def test_wrong_scenarios_name_the_place(change, words):
@@ -46,6 +58,21 @@ def test_wrong_scenarios_name_the_place(change, words):
         scenario_from_mapping({**GOOD, **change}, "s", "s.yaml")
     for word in words:
         assert word in str(error.value)
+
+
+def test_text_of_a_scenario_needs_no_other_file(tmp_path):
+    """What goes into a bag can be read back anywhere, changed settings included."""
+    (tmp_path / "here").mkdir()
+    kind = {**yaml.safe_load((config_directory() / "robots" / "epuck.yaml").read_text())}
+    (tmp_path / "here" / "kind.yaml").write_text(yaml.safe_dump(kind))
+    values = {**GOOD, "robots": {"r": {"type": "kind.yaml", "start": [0, 0, 0], "mass": 0.2}}}
+    (tmp_path / "here" / "s.yaml").write_text(yaml.safe_dump(values))
+    scenario = load_scenario(str(tmp_path / "here" / "s.yaml")).settings("bridge", seed=9)
+    again = scenario_from_mapping(yaml.safe_load(scenario.text), "s", "bag")
+    assert again.text == scenario.text
+    assert again.robot()[1] == scenario.robot()[1] and again.robot()[1].mass == 0.2
+    assert again.environment == scenario.environment
+    assert again.parameters == {"bridge": {"seed": 9}}
 
 
 def test_malformed_yaml_names_the_file(tmp_path):

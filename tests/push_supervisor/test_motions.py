@@ -19,7 +19,8 @@ def segment():
     end = se2.compose(START, np.array([0.5, 0.0, 0.0]))
     limits = CurvatureLimits(-2.0, 2.0)
     last = way.pose[-1]
-    return PushSegment(0, START, end, robot, last, robot, 0.5, 0.5, 0.5, limits, 0.1, way)
+    wait = se2.compose(robot, np.array([-0.06, 0.0, 0.0]))
+    return PushSegment(0, START, end, robot, last, wait, 0.5, 0.5, 0.5, limits, 0.1, way)
 
 
 def test_contact_follows_the_object(segment):
@@ -30,7 +31,7 @@ def test_contact_follows_the_object(segment):
 
 def test_standoff_lies_behind_the_contact(segment):
     item = np.array([0.1, 0.3, -0.4])
-    wait = motions.standoff(segment, item, 0.06)
+    wait = motions.standoff(segment, item)
     assert se2.between(wait, segment.contact(item)) == pytest.approx([0.06, 0.0, 0.0])
 
 

@@ -4,14 +4,18 @@ import math
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import OccupancyGrid
+from rclpy.action import ActionClient
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Header
 
 from push_bringup.lockstep import LockstepRun
+from push_msgs.action import FollowTrajectory, MoveObject, PlanPush
 from push_msgs.msg import NamedPose, NamedPoses
-from push_ros.qos import COMMAND, LATCHED, STREAM
+from push_msgs.srv import LoadScenario, PlanRobotPath, Reset
+from push_ros.qos import COMMAND, LATCHED, STATUS, STREAM
 from push_ros.scenario import load_scenario
 
 SPECIAL = [0.0, -1.0, 1.0, 1e-300, 1e300, math.nan, math.inf, -math.inf, 0.3]
@@ -49,39 +53,104 @@ def randomise(message, random):
             message.poses = [randomise(NamedPose(), random) for _ in range(random.integers(0, 4))]
         elif kind.startswith("sequence<int8"):
             setattr(message, name, [0] * int(random.integers(0, 30)))
+        elif kind.startswith("sequence<double"):
+            setattr(message, name, random.choice(SPECIAL, random.integers(0, 4)).tolist())
     return message
 
 
-def test_random_messages_and_random_bytes_crash_nothing_and_move_nothing(run):
-    random = np.random.default_rng(5)
+ACTIONS = {
+    "/plan_push": PlanPush,
+    "/epuck1/follow_trajectory": FollowTrajectory,
+    "/move_object": MoveObject,
+}
+
+
+def spin(run, seconds):
+    end = run.bridge.time + seconds
+    run.spin_until(lambda: run.bridge.time >= end, seconds, 5.0)
+
+
+@pytest.mark.parametrize("busy", [False, True])
+@pytest.mark.parametrize("seed", range(2))
+def test_random_messages_and_random_bytes_crash_nothing(run, seed, busy):
+    """On every topic, action and service, at rest and in mid-job: all stays finite, and when it is
+    over the suite does what it is asked to."""
+    random = np.random.default_rng(seed)
     node = run.observer
     publishers = {t: node.create_publisher(m, t, q) for t, (m, q) in INPUTS.items()}
+    clients = {t: ActionClient(node, a, t) for t, a in ACTIONS.items()}
+    paths = node.create_client(PlanRobotPath, "/plan_robot_path")
+    scenes = node.create_client(LoadScenario, "/bridge/load_scenario")
     assert run.spinner.until(
-        lambda: all(p.get_subscription_count() > 0 for p in publishers.values()), 5.0
+        lambda: (
+            all(p.get_subscription_count() > 0 for p in publishers.values())
+            and all(c.server_is_ready() for c in clients.values())
+            and paths.service_is_ready()
+            and scenes.service_is_ready()
+        ),
+        5.0,
     )
     commands = []
     node.create_subscription(TwistStamped, "/epuck1/cmd_vel", commands.append, COMMAND)
-    start = None
-    for round_number in range(60):
+    if busy:
+        node.send_goal(run.scenario.goal)
+        spin(run, 2.0)
+    for _ in range(40):
         for topic, publisher in publishers.items():
             kind = INPUTS[topic][0]
-            if topic == "/map" and round_number > 5:
-                continue  # a random map is refused; a valid tiny one would blind the planner
             publisher.publish(randomise(kind(), random))
             publisher.publish(bytes(random.integers(0, 256, random.integers(4, 60)).tolist()))
+        for topic, client in clients.items():
+            client.send_goal_async(randomise(ACTIONS[topic].Goal(), random))
+        paths.call_async(randomise(PlanRobotPath.Request(), random))
+        scenes.call_async(randomise(LoadScenario.Request(), random))
         for _ in range(30):
             run.spinner.once(0.002)
-        if start is None and run.observer.trace.robot:
-            start = run.observer.trace.robot[-1].copy()
-    run.spin_until(lambda: False, 0.5, 5.0)
-    # the stream of real poses may have been poisoned in time; nothing may have been in space
-    trace = np.array(run.observer.trace.robot)
-    assert np.isfinite(trace).all() and np.isfinite(np.array(run.observer.trace.object)).all()
+    spin(run, 0.5)
+    assert np.isfinite(np.array(run.observer.trace.robot)).all()
+    assert np.isfinite(np.array(run.observer.trace.object)).all()
     assert np.isfinite(run.bridge.world.poses()["epuck1"]).all()
     ours = [c for c in commands if c.header.frame_id == "base_link"]
     assert ours and all(
         math.isfinite(c.twist.linear.x) and math.isfinite(c.twist.angular.z) for c in ours
     )
+    reset = node.create_client(Reset, "/bridge/reset")
+    assert run.spinner.until(reset.service_is_ready, 5.0)
+    done = reset.call_async(Reset.Request())
+    assert run.spinner.until(done.done, 5.0)
+    spin(run, 0.5)
+    state = run.reach(run.scenario.goal)
+    assert state is not None and state.error_code == 0, state
+
+
+def test_every_node_publishes_diagnostics_and_counts_what_it_refuses(run):
+    """FAULTS 1: what is refused is seen from outside."""
+    statuses = {}
+
+    def keep(message):
+        for status in message.status:
+            statuses[status.name] = status
+
+    node = run.observer
+    node.create_subscription(DiagnosticArray, "/diagnostics", keep, STATUS)
+    publisher = node.create_publisher(NamedPoses, "/poses", STREAM)
+    assert run.spinner.until(lambda: publisher.get_subscription_count() >= 2, 5.0)
+    bad = NamedPoses(poses=[NamedPose(name="box")])
+    bad.header.frame_id = "odom"
+    bad.header.stamp.nanosec = 1
+    for _ in range(3):
+        publisher.publish(bad)
+        spin(run, 0.2)
+
+    def refused(name):
+        status = statuses.get(name)
+        return status is not None and any(
+            v.key == "refused /poses" and int(v.value) > 0 for v in status.values
+        )
+
+    assert run.spinner.until(lambda: refused("controller") and refused("supervisor"), 10.0)
+    assert {"bridge", "planner", "controller", "supervisor"} <= set(statuses)
+    assert statuses["bridge"].level == DiagnosticStatus.OK
 
 
 def test_mismatched_qos_shows_in_diagnostics(run):

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import OccupancyGrid, Path
-from PIL import Image
 from rclpy.node import Node
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -20,7 +19,7 @@ from push_msgs.action import MoveObject
 from push_msgs.msg import SupervisorState
 from push_ros.conversions import pose_stamped_to_ros
 from push_ros.qos import COMMAND, LATCHED
-from push_ros.scenario import config_directory, load_scenario
+from push_ros.scenario import load_scenario
 from tf2_msgs.msg import TFMessage
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
@@ -103,17 +102,8 @@ def test_equal_seeds_give_equal_runs_to_the_bit_also_in_a_fresh_process():
     assert run_once(seed=4) != here
 
 
-def test_a_map_of_map_server_is_an_environment(tmp_path):
-    pixels = np.full((60, 110), 254, dtype=np.uint8)
-    pixels[:, :4] = pixels[:, -4:] = pixels[:12, :] = pixels[-12:, :] = 0
-    Image.fromarray(pixels).save(tmp_path / "room.pgm")
-    (tmp_path / "room.yaml").write_text(
-        "image: room.pgm\nresolution: 0.02\norigin: [-1.1, -0.6, 0.0]\nnegate: 0\n"
-        "occupied_thresh: 0.65\nfree_thresh: 0.25\n"
-    )
-    text = (config_directory() / "scenarios" / "short.yaml").read_text()
-    (tmp_path / "in_a_room.yaml").write_text(text.replace(": open", ": room.yaml"))
-    with LockstepRun(load_scenario(str(tmp_path / "in_a_room.yaml")), quiet=True) as run:
+def test_a_map_of_map_server_is_an_environment(room):
+    with LockstepRun(load_scenario(room), quiet=True) as run:
         run.start()
         beyond = run.reach(np.array([0.0, 0.5, 0.0]))
         assert beyond.error_code == MoveObject.Result.GOAL_OCCUPIED, beyond

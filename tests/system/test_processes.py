@@ -8,10 +8,13 @@ import time
 
 import numpy as np
 import pytest
+import yaml
+from mcap.reader import make_reader
 
-from push_bringup.bag import read_bag
-from push_bringup.launcher import Launcher, single_robot
+from push_bringup.bag import bag_file, read_bag
+from push_bringup.launcher import Child, Launcher, single_robot
 from push_bringup.monitor import Monitor
+from push_msgs.msg import SupervisorState
 from push_ros.process import claim_domain
 
 FACTOR = ["--ros", "-p", "real_time_factor:=3.0"]
@@ -26,9 +29,9 @@ def alive(group):
     return [c for c in group if c.process is not None and c.process.poll() is None]
 
 
-def standstill(bag, sign):
-    """Sim time [s] that the bag covers after the last ``sign``, and the robot's way [m] from 0.4 s
-    after it on, both by the ground truth."""
+def standstill(bag, sign, limit):
+    """Sim time [s] that the bag covers after the last ``sign``, and the robot's way [m] from
+    ``limit`` [s] after it on, both by the ground truth."""
     truth, last = [], 0.0
     for record in read_bag(bag, {sign, "/ground_truth/poses"}):
         header = record.message if record.topic == "/epuck1/heartbeat" else record.message.header
@@ -41,7 +44,7 @@ def standstill(bag, sign):
     table = np.array(truth)
     moving = table[(table[:, 0] > last - 0.5) & (table[:, 0] <= last)]
     assert np.hypot(*(moving[-1] - moving[0])[1:]) > 0.01, "it was to be killed on the move"
-    rest = table[table[:, 0] > last + 0.4]
+    rest = table[table[:, 0] > last + limit]
     return table[-1, 0] - last, float(np.hypot(*np.ptp(rest[:, 1:], axis=0)))
 
 
@@ -77,11 +80,36 @@ def test_killed_node(domain, victim, respawn, tmp_path):
         launcher.stop()
     assert time.monotonic() - started < 5.0 and not alive(children)
     if not respawn:
-        sign = "/epuck1/cmd_vel" if victim == "controller" else "/epuck1/heartbeat"
-        covered, way = standstill(tmp_path / "bag", sign)
+        # three times real time: 0.2 s of sim time for commands, 0.25 s of wall time for heartbeats
+        sign, limit = {
+            "controller": ("/epuck1/cmd_vel", 0.4),
+            "supervisor": ("/epuck1/heartbeat", 1.0),
+        }[victim]
+        covered, way = standstill(tmp_path / "bag", sign, limit)
         assert covered > 1.5 and way < 1e-3  # it rocks by 0.2 mm
     topics = {r.topic for r in read_bag(tmp_path / "bag")}
     assert {"/poses", "/epuck1/cmd_vel", "/supervisor/state"} <= topics
+
+
+def test_a_planner_killed_at_work_is_asked_again(domain):
+    """FAULTS 11: it dies with the request; the one started in its place gets it anew."""
+    said = []
+    impatient = {"supervisor": ["--ros", "-p", "answer_timeout:=4.0"], "bridge": FACTOR}
+    launcher = Launcher(single_robot("short", "", impatient), True, said.append)
+    launcher.start()
+    try:
+        with Monitor() as monitor:
+            assert monitor.connect(40.0, lambda: not launcher.check())
+            (child,) = [c for c in launcher.children if c.name == "planner"]
+            child.process.send_signal(signal.SIGSTOP)  # it takes the request but never answers
+            monitor.send_goal((0.1, 0.04, 0.1))
+            assert monitor.wait(10.0, lambda: monitor.state.state == SupervisorState.PLANNING)
+            monitor.wait(0.5, lambda: False)
+            child.process.send_signal(signal.SIGKILL)
+            assert monitor.follow(90.0, lambda: launcher.check() is not None) == 0, monitor.state
+    finally:
+        launcher.stop()
+    assert any("planner died (signal 9)" in text for text in said)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -111,8 +139,90 @@ def test_signals_at_random_moments(domain, number, seed, tmp_path):
     process.wait(5.0)
     time.sleep(0.1)
     assert not [pid for pid in children if os.path.exists(f"/proc/{pid}") and not zombie(pid)]
-    if (tmp_path / "bag").exists() and list((tmp_path / "bag").glob("*.mcap")):
-        list(read_bag(tmp_path / "bag"))
+    if (tmp_path / "bag").exists():
+        assert_closed(tmp_path / "bag")
+
+
+def assert_closed(bag):
+    """By a strict reader: footer, summary and metadata are there and agree."""
+    with bag_file(bag).open("rb") as file:
+        summary = make_reader(file).get_summary()
+        assert summary is not None and summary.statistics is not None
+        count = summary.statistics.message_count
+    information = yaml.safe_load((bag / "metadata.yaml").read_text())
+    assert information["rosbag2_bagfile_information"]["message_count"] == count
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signals_end_a_demo(domain, number, tmp_path):
+    """FAULTS 18, in the middle of a push."""
+    words = ["demo", "--scenario", "short", "--out", str(tmp_path / "demo")]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "push_bringup.cli", *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        start_new_session=True,
+    )
+    for line in process.stdout:
+        if "pushing" in line:
+            break
+    children = children_of(process.pid)
+    assert len(children) >= 5
+    process.send_signal(number)
+    process.communicate(timeout=5.0)
+    assert process.returncode == 130
+    assert not [pid for pid in children if os.path.exists(f"/proc/{pid}") and not zombie(pid)]
+    assert_closed(tmp_path / "demo" / "bag")
+
+
+def test_a_recorder_that_is_started_again_writes_beside_the_first_bag(domain, tmp_path):
+    said = []
+    children = [
+        Child("recorder", ["recorder", "--scenario", "short", "--out", str(tmp_path / "b")])
+    ]
+    launcher = Launcher(children, True, said.append)
+    launcher.start()
+    try:
+        assert until(lambda: list((tmp_path / "b").glob("*.mcap")), 30.0)
+        children[0].process.send_signal(signal.SIGKILL)
+        assert until(launcher.check, 5.0) or said
+        assert until(lambda: list((tmp_path / "b-2").glob("*.mcap")), 30.0)
+        assert not launcher.check(), said
+    finally:
+        launcher.stop()
+    assert_closed(tmp_path / "b-2")
+
+
+def test_a_node_that_dies_again_and_again_is_given_up(domain):
+    said = []
+    launcher = Launcher([Child("bad", ["bridge", "--scenario", "atlantis"])], True, said.append)
+    launcher.start()
+    assert launcher.run() == 1
+    assert sum("is started again" in text for text in said) == 5
+    assert "not started again" in " ".join(said) and said[-1] == "stopping the rest"
+
+
+def until(condition, limit):
+    end = time.monotonic() + limit
+    while time.monotonic() < end and not condition():
+        time.sleep(0.05)
+    return condition()
+
+
+@pytest.mark.parametrize("value", ["0.0", "fast"])
+def test_a_wrong_parameter_on_the_command_line_is_an_error_not_a_traceback(domain, value):
+    """FAULTS 20."""
+    words = ["node", "bridge", "--scenario", "short", "--ros", "-p", f"real_time_factor:={value}"]
+    done = subprocess.run(
+        [sys.executable, "-m", "push_bringup.cli", *words],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 2 and "Traceback" not in done.stderr
+    assert "real_time_factor" in done.stderr
 
 
 def children_of(pid):
