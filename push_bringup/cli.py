@@ -127,7 +127,10 @@ def _demo(arguments: argparse.Namespace) -> int:
         (out / name).unlink(missing_ok=True)
     if (out / "bag").exists():
         shutil.rmtree(out / "bag")
-    extra = {"bridge": ["--ros", "-p", f"real_time_factor:={arguments.factor}"]}
+    extra = {
+        "bridge": ["--ros", "-p", f"real_time_factor:={arguments.factor}"],
+        "supervisor": ["--ros", "--log-level", "supervisor:=warn"],  # the monitor shows its states
+    }
     children = single_robot(arguments.scenario, str(out / "bag"), extra)
     launcher = Launcher(children)
     stopped = False

@@ -102,7 +102,7 @@ def _results(
             from dask.distributed import Client
             from dask.distributed import as_completed as dask_completed
         except ImportError:
-            raise SystemExit("--scheduler needs Dask: pip install 'distributed'") from None
+            raise SystemExit("--scheduler needs Dask: pip install distributed") from None
         with Client(scheduler) as client:
             futures = {client.submit(guarded, trial, t, pure=False): i for i, t in enumerate(tasks)}
             for future in dask_completed(futures):

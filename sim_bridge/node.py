@@ -207,6 +207,10 @@ class BridgeNode(Node):
             if self._lockstep.ready:  # while paused it is kept for later
                 self._advance()
 
+    def driving(self, robot: str) -> bool:
+        """Whether the robot's last command was to move, and still holds."""
+        return self._driving[robot]
+
     def _stop(self, robot: str) -> None:
         assert self.world is not None
         self.world.command(robot, 0.0, 0.0)

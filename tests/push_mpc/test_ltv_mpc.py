@@ -2,6 +2,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from push_model import CurvatureLimits, DifferentialDrive
 from push_mpc import (
@@ -135,12 +137,24 @@ def test_nan_input_is_a_failure_that_leaves_no_trace(where):
     )
 
 
-def test_half_plane_of_2_60_needs_the_unit_normal():
-    """Errata (2.59): printed, q lacks the obstacle's centre; corrected, n'p <= n'o - delta."""
-    o, delta, p = np.array([1.0, 0.5]), 0.2, np.array([0.2, 0.1])
+@given(st.integers(0, 10**6))
+def test_obstacle_rows_are_half_planes_with_the_unit_normal(seed):
+    """Errata (2.59)-(2.60): n'p <= n'o - delta, n the unit vector from robot to obstacle. As
+    printed, with q_i without the obstacle's centre, the plane lies elsewhere."""
+    random = np.random.default_rng(seed)
+    x, y, theta = random.uniform(-1, 1, 3)
+    o = np.array([x, y]) + random.uniform(0.1, 0.5) * np.array([np.cos(seed), np.sin(seed)])
+    delta = 0.05
+    mpc = LtvMpc(MpcSettings(), DRIVE)
+    still = Reference(np.tile([x, y, theta], (21, 1)), np.zeros((21, 3)))
+    qp = mpc.programme(np.zeros(5), still, None, np.array([[*o, delta]]))
+    row = int(np.flatnonzero(np.isfinite(qp.bound[0]))[-1])
+    c, s = np.cos(theta), np.sin(theta)
+    turn = np.array([[c, -s], [s, c]])
+    n = turn @ qp.normal[0, :2, row]  # back into the world
+    p = np.array([x, y])
+    assert n == pytest.approx((o - p) / np.linalg.norm(o - p))
+    # the row holds for errors e in the reference frame: p = reference + R e
+    assert qp.bound[0, row] == pytest.approx(n @ o - delta - n @ p)
     printed = delta * (p - o) / np.linalg.norm(p - o)
-    corrected = o + printed
-    assert np.linalg.norm(corrected - o) == pytest.approx(delta)
-    assert np.linalg.norm(printed - o) > 2 * delta
-    n = (o - p) / np.linalg.norm(o - p)
-    assert (corrected - p) / np.linalg.norm(corrected - p) == pytest.approx(n)
+    assert abs(n @ printed - (n @ o - delta)) == pytest.approx(abs(n @ o), abs=1e-9)

@@ -314,7 +314,7 @@ def test_bad_commands_never_reach_the_wheels(short):
         message.header.stamp = pose_stamped_to_ros(np.zeros(3), max(stamp, 0.0)).header.stamp
         stranger.publish(message)
     assert moved(short, 1.0) < 1e-4
-    assert short.bridge._diagnostics.refused["/epuck1/cmd_vel"] >= 4
+    assert short.bridge._diagnostics.refused["/epuck1/cmd_vel"] == 5
 
 
 def test_cancelled_action_reports_canceled(short):
