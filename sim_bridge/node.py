@@ -240,12 +240,20 @@ class BridgeNode(Node):
         stamp = time_to_ros(self.time)
         truth = self.world.poses()
         self._clock_publisher.publish(ClockMessage(clock=stamp))
-        self._truth_publisher.publish(self._frame_to_ros(truth, self.tick))
-        self._contacts_publisher.publish(self._contacts_to_ros(self.world.read_contacts(), stamp))
+        # messages that nobody reads are not even made
+        if self._truth_publisher.get_subscription_count():
+            self._truth_publisher.publish(self._frame_to_ros(truth, self.tick))
+        contacts = self.world.read_contacts()
+        if self._contacts_publisher.get_subscription_count():
+            self._contacts_publisher.publish(self._contacts_to_ros(contacts, stamp))
         if self.tick % self._decimation == 0:
-            transforms = [transform_to_ros(n, p, self.time) for n, p in truth.items()]
-            self._tf_publisher.publish(TFMessage(transforms=transforms))
-            if self.tick % (5 * self._decimation) == 0:
+            if self._tf_publisher.get_subscription_count():
+                transforms = [transform_to_ros(n, p, self.time) for n, p in truth.items()]
+                self._tf_publisher.publish(TFMessage(transforms=transforms))
+            if (
+                self.tick % (5 * self._decimation) == 0
+                and self._marker_publisher.get_subscription_count()
+            ):
                 self._marker_publisher.publish(body_markers(self._scenario, truth, self.time))
         frame = self._capture.observe(self.tick, truth)
         if frame is None:
