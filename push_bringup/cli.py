@@ -158,6 +158,8 @@ def _demo(arguments: argparse.Namespace) -> int:
         launcher.stop()
     if stopped:
         return 130
+    if not any((out / "bag").glob("*.mcap")):
+        return 1  # nothing was recorded; why has been said
     for number in (signal.SIGINT, signal.SIGTERM):  # nothing is left to stop: just end
         signal.signal(number, lambda *_: sys.exit(130))
     print("writing the report", flush=True)
@@ -323,7 +325,7 @@ def main(words: Sequence[str] | None = None) -> int:
     arguments = parser().parse_args(words)
     try:
         code: int = arguments.run(arguments)
-    except (SettingsError, FileExistsError) as error:
+    except (SettingsError, FileExistsError, FileNotFoundError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
     return code

@@ -109,6 +109,7 @@ def single_robot_trial(task: SingleRobotTask) -> Row:
     if believed.goal is None:
         raise ValueError(f"scenario '{task.scenario}' has no goal")
     folder = Path(task.out)
+    folder.mkdir(parents=True, exist_ok=True)  # on a machine of a cluster, perhaps
 
     def extra() -> list[Any]:
         return [RecorderNode(folder / "bag", believed, task.seed)] if task.record else []
@@ -184,8 +185,9 @@ def single_robot(
         for j, name in enumerate(scenarios)
         for i in range(trials)
     ]
-    if (out / "bag").exists():
-        raise FileExistsError(f"{out}/bag is there already; choose another --out or remove it")
+    for name in ("bag", "trials.jsonl"):
+        if (out / name).exists():
+            raise FileExistsError(f"{out}/{name} is there already; choose another --out")
     rows = run_trials(single_robot_trial, tasks, out / "trials.jsonl", scheduler, workers)
     summary = {
         "experiment": "single-robot",

@@ -86,8 +86,16 @@ class Monitor:
         self._news = 0
         self._publisher.publish(pose_stamped_to_ros(np.array(goal), 0.0))
 
+    def _is_mine(self, state: SupervisorState) -> bool:
+        assert self._goal is not None
+        p = state.goal.pose.position
+        return bool(np.hypot(p.x - self._goal[0], p.y - self._goal[1]) < 1e-6)
+
     def follow(self, limit: float, alive: Callable[[], bool]) -> int:
-        """Show progress until the job ends; 0 on success, 1 otherwise."""
+        """Show progress until the job ends, or its plan waits for the execute command.
+
+        Returns 0 on success, 1 otherwise.
+        """
         assert self._goal is not None
         end = time.monotonic() + limit
         shown = 0.0
@@ -97,8 +105,11 @@ class Monitor:
                 return 1
             self._spinner.once(0.1)
             state = self.state
-            if self._news and state is not None and state.state == SupervisorState.IDLE:
-                return 0 if state.error_code == 0 else 1
+            if self._news and state is not None:
+                if state.reason.startswith("goal refused"):
+                    return 1  # a job of somebody else goes on, or none
+                if state.state == SupervisorState.IDLE:
+                    return 0 if state.error_code == 0 and self._is_mine(state) else 1
             if time.monotonic() - shown > 2.0 and self.position is not None:
                 shown = time.monotonic()
                 gap = np.hypot(self.position[0] - self._goal[0], self.position[1] - self._goal[1])

@@ -7,7 +7,9 @@ import json
 import multiprocessing
 import multiprocessing.connection
 import os
+import pickle
 import signal
+import subprocess
 import sys
 import threading
 import time
@@ -104,9 +106,16 @@ def _results(
         except ImportError:
             raise SystemExit("--scheduler needs Dask: pip install distributed") from None
         with Client(scheduler) as client:
-            futures = {client.submit(guarded, trial, t, pure=False): i for i, t in enumerate(tasks)}
+            futures = {
+                client.submit(_isolated, trial, t, pure=False): i for i, t in enumerate(tasks)
+            }
             for future in dask_completed(futures):
-                yield futures[future], future.result()
+                index = futures[future]
+                error = future.exception()
+                yield (
+                    index,
+                    future.result() if error is None else _failed(tasks[index], repr(error)),
+                )
         return
     yield from _local_results(trial, tasks, workers or os.cpu_count() or 1)
 
@@ -130,12 +139,12 @@ def _local_results(trial: Trial, tasks: Sequence[Any], workers: int) -> Iterator
                 index, process = running.pop(ready)
                 try:
                     row = ready.recv()
-                except EOFError:
-                    process.join()
+                except (EOFError, OSError):
+                    _end(process)
                     text = f"the trial's process died (exit code {process.exitcode})"
                     row = _failed(tasks[index], text)
                 yield index, row
-                process.join()
+                _end(process)
     finally:
         for _, process in running.values():
             process.terminate()
@@ -145,8 +154,37 @@ def _local_results(trial: Trial, tasks: Sequence[Any], workers: int) -> Iterator
                 process.kill()
 
 
+def _end(process: BaseProcess) -> None:
+    """Its row is here; it has a few seconds to tidy up."""
+    process.join(5.0)
+    if process.is_alive():
+        process.kill()
+        process.join()
+
+
+def _isolated(trial: Trial, task: Any) -> Row:
+    """The trial in a process of its own, from a Dask worker, which must not have children."""
+    done = subprocess.run(
+        [sys.executable, "-m", "push_bringup.trials"],
+        input=pickle.dumps((trial, task)),
+        stdout=subprocess.PIPE,
+        check=False,
+    )
+    if done.returncode != 0:
+        return _failed(task, f"the trial's process died (exit code {done.returncode})")
+    row: Row = pickle.loads(done.stdout)
+    return row
+
+
 def _in_process(sender: Connection, trial: Trial, task: Any) -> None:
     """In a process of its own, which a key press does not reach and which outlives nobody."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     die_with_parent()
     sender.send(guarded(trial, task))
+
+
+if __name__ == "__main__":  # a trial for _isolated: the task comes in, nothing but the row goes out
+    answer = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    answer.write(pickle.dumps(guarded(*pickle.load(sys.stdin.buffer))))
+    answer.close()

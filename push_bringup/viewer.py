@@ -5,6 +5,7 @@ The viewer is a ROS node like any other: it sees poses, map, plan and states, se
 only, unless told otherwise.
 """
 
+import contextlib
 import json
 import math
 import queue
@@ -26,7 +27,6 @@ from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from push_bringup.report import outlines_of
-from push_model import se2
 from push_model.occupancy import OccupancyGrid
 from push_msgs.msg import ControllerStatus, NamedPoses, SupervisorState
 from push_ros.conversions import grid_from_ros, pose_stamped_to_ros, time_from_ros
@@ -35,6 +35,7 @@ from push_ros.scenario import Scenario
 from push_ros.validation import InvalidMessage, planar_pose
 
 _PERIOD = 0.05  # [s] between events to a page
+_LONGEST = 10_000  # [bytes] of a request
 _LOG = 60  # states kept
 
 
@@ -91,8 +92,8 @@ class ViewerNode(Node):
     def _on_state(self, message: SupervisorState) -> None:
         goal = None
         if message.goal.header.frame_id:
-            p, q = message.goal.pose.position, message.goal.pose.orientation
-            goal = [p.x, p.y, se2.yaw_from_quaternion(q.x, q.y, q.z, q.w)]
+            with contextlib.suppress(InvalidMessage):
+                goal = planar_pose(message.goal.pose, "the goal").tolist()
         stamp = time_from_ros(message.header.stamp)
         with self._lock:
             self._view["goal"] = goal
@@ -157,9 +158,12 @@ class ViewerNode(Node):
 class _Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
 
-    def __init__(self, node: ViewerNode, stopping: threading.Event, *arguments: Any) -> None:
+    def __init__(
+        self, node: ViewerNode, stopping: threading.Event, hosts: set[str], *arguments: Any
+    ) -> None:
         self._node = node
         self._stopping = stopping
+        self._hosts = hosts
         super().__init__(*arguments)
 
     def log_message(self, *_: Any) -> None:
@@ -185,12 +189,14 @@ class _Handler(BaseHTTPRequestHandler):
             self._answer(404, "text/plain", b"not here\n")
 
     def do_POST(self) -> None:
-        """A goal, or cancel. Only from the page itself: another site's Origin is refused."""
-        origin = self.headers.get("Origin")
-        if origin is not None and origin.split("//")[-1] != self.headers.get("Host"):
-            self._answer(403, "text/plain", b"from another site\n")
+        """A goal, or cancel; only from the page itself, not from one of another site."""
+        length = self.headers.get("Content-Length", "")
+        if not (self._from_here() and length.isdigit() and int(length) <= _LONGEST):
+            # what follows on this connection is not read, least of all as a request
+            self.close_connection = True
+            self._answer(403, "text/plain", b"only from the page itself\n")
             return
-        body = self.rfile.read(min(int(self.headers.get("Content-Length") or 0), 10_000))
+        body = self.rfile.read(int(length))
         if self.path == "/cancel":
             self._node.cancel()
             self._answer(202, "text/plain", b"asked\n")
@@ -208,6 +214,17 @@ class _Handler(BaseHTTPRequestHandler):
             self._answer(202, "text/plain", b"sent\n")
         else:
             self._answer(404, "text/plain", b"not here\n")
+
+    def _from_here(self) -> bool:
+        """Whether the page that asks was served here: its JSON is announced as such, which other
+        sites cannot do unasked, and the host is one that this server goes by."""
+        host = self.headers.get("Host", "").rsplit(":", 1)[0]
+        origin = self.headers.get("Origin", f"http://{self.headers.get('Host')}")
+        return (
+            self.headers.get("Content-Type") == "application/json"
+            and host in self._hosts
+            and origin == f"http://{self.headers.get('Host')}"
+        )
 
     def _answer(self, code: int, kind: str, body: bytes) -> None:
         self.send_response(code)
@@ -242,7 +259,9 @@ class ViewerServer:
 
     def __init__(self, node: ViewerNode, host: str, port: int) -> None:
         self._stopping = threading.Event()
-        self._server = ThreadingHTTPServer((host, port), partial(_Handler, node, self._stopping))
+        hosts = {"127.0.0.1", "localhost", "[::1]", host}
+        handler = partial(_Handler, node, self._stopping, hosts)
+        self._server = ThreadingHTTPServer((host, port), handler)
         self._server.daemon_threads = True
         self.port = int(self._server.server_address[1])
         self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)

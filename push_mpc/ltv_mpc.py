@@ -95,6 +95,10 @@ class LtvMpc:
         reference: over the horizon, first sample now.
         limits: stable curvatures now, in a push; None when the robot moves alone.
         circles: ``(m, 3)`` x, y, least distance of the axle midpoint; m <= max_obstacles.
+
+        Raises
+        ------
+        ValueError: more circles than that.
         """
         started = time.thread_time()
         # a sum is finite only if every term is
@@ -123,6 +127,8 @@ class LtvMpc:
         Parameters as of ``solve``. Its arrays are overwritten by the next call.
         """
         s, qp = self.settings, self._qp
+        if len(circles) > s.max_obstacles:
+            raise ValueError(f"{len(circles)} obstacles, at most {s.max_obstacles} have a row")
         twist = np.ascontiguousarray(reference.twist)
         condense(
             error,

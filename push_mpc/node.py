@@ -98,9 +98,7 @@ class ControllerNode(Node):
             check=self._parse,
             start=self._begin,
             cancel=self._canceled,
-            preempt=lambda: self._end(
-                FollowTrajectory.Result.PREEMPTED, "a new trajectory replaces this one"
-            ),
+            preempt=self._preempt,
         )
         self.create_subscription(Header, f"/{self.robot}/heartbeat", self._on_heartbeat, STREAM)
         self.create_subscription(
@@ -169,6 +167,10 @@ class ControllerNode(Node):
         self.tracker.start(task)
         self._mode = ControllerStatus.PUSH if task.push else ControllerStatus.MOVE
         self._reason = "following a trajectory"
+
+    def _preempt(self) -> None:
+        if self._server.active:
+            self._end(FollowTrajectory.Result.PREEMPTED, "a new trajectory replaces this one")
 
     def _canceled(self) -> None:
         self._end(FollowTrajectory.Result.CANCELED, "canceled")

@@ -59,7 +59,7 @@ class Qp:
 
     def all_rows(self) -> Index:
         """Numbers of the rows that there are."""
-        return np.flatnonzero(np.isfinite(self.bound))
+        return np.flatnonzero(~np.isposinf(self.bound))
 
     @staticmethod
     def dense(H: Array, f: Array, G: Array, b: Array, low: Array, high: Array) -> "Qp":
@@ -101,12 +101,14 @@ class ActiveSetBackend:
     _active: Index = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     _multiplier: Array = field(default_factory=lambda: np.zeros(0))
     _count: int = 0
+    _shape: tuple[int, ...] = ()
 
     def solve(self, qp: Qp) -> QpSolution:
         """See QpBackend."""
         n = len(qp.f)
-        if len(self._active) != n:
-            self._active, self._multiplier, self._count = np.zeros(n, np.int64), np.zeros(n), 0
+        if self._shape != (n, *qp.bound.shape):  # what was remembered is of other rows
+            self._shape, self._count = (n, *qp.bound.shape), 0
+            self._active, self._multiplier = np.zeros(n, np.int64), np.zeros(n)
         z = np.empty(n)
         status, iterations, self._count = active_set.solve(
             qp.H,
@@ -154,7 +156,7 @@ class DaqpBackend:
 
     def solve(self, qp: Qp) -> QpSolution:
         """See QpBackend. From the rows near the last solution on, adds those that are violated."""
-        there = np.isfinite(qp.bound).ravel()
+        there = ~np.isposinf(qp.bound).ravel()
         chosen = np.zeros(len(there), dtype=np.bool_)
         chosen[self._near[self._near < len(there)]] = True
         guess = np.zeros(len(there), dtype=np.bool_)
@@ -165,6 +167,8 @@ class DaqpBackend:
             if not result.solved:
                 return result
             room = qp.rooms(result.z)
+            if np.isnan(room[there]).any():
+                return QpSolution(result.z, False, "daqp: a row is not finite")
             tight = there & (room <= _TOLERANCE)
             missing = (room < -_TOLERANCE) & ~chosen
             if not missing.any():
@@ -177,6 +181,8 @@ class DaqpBackend:
 
     def _solve_rows(self, qp: Qp, index: Index, active: NDArray[np.bool_]) -> QpSolution:
         G, b = qp.rows(index)
+        if not (np.isfinite(G).all() and np.isfinite(b).all()):
+            return QpSolution(np.full(len(qp.f), np.nan), False, "daqp: a row is not finite")
         upper = np.concatenate([qp.high, b])
         lower = np.concatenate([qp.low, np.full(len(b), -1e30)])
         sense = np.zeros(len(upper), dtype=np.int32)
@@ -202,6 +208,8 @@ class OsqpBackend:
         """See QpBackend. Set up anew each time: a warm solver that met a NaN stays poisoned."""
         G, b = qp.rows(qp.all_rows())
         n, m = len(qp.f), len(b)
+        if not all(np.isfinite(a).all() for a in (G, b, qp.H, qp.f)):
+            return QpSolution(np.full(n, np.nan), False, "osqp: the programme is not finite")
         solver = osqp.OSQP()
         rows = sparse.vstack([sparse.csc_matrix(G), sparse.eye(n, format="csc")], format="csc")
         solver.setup(

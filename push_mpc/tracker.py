@@ -103,7 +103,7 @@ class TrajectoryTracker:
         """Compile and solve once, so that the first command does not wait."""
         p = self.mpc.settings.horizon
         still = Reference(np.zeros((p + 1, 3)), np.zeros((p + 1, 3)))
-        circles = np.array([[1.0, 0.0, 0.5]])
+        circles = np.array([[1.0, 0.0, 0.5]])[: self.mpc.settings.max_obstacles]
         self.mpc.solve(np.full(5, 1e-3), still, CurvatureLimits(-1.0, 1.0), circles)
         self.mpc.solve(np.full(5, 1e-3), still, None, _NO_CIRCLES)
         self.mpc.reset()
@@ -207,7 +207,7 @@ class TrajectoryTracker:
         started = time.perf_counter()
         solve = self.mpc.solve(error, reference, limits, self._nearest(task, robot))
         late = time.perf_counter() - started
-        if 0.0 < self.settings.deadline < late:
+        if solve.solved and 0.0 < self.settings.deadline < late:
             return replace(solve, solved=False, late=True, reason=f"late: {1e3 * late:.1f} ms")
         return solve
 

@@ -81,7 +81,7 @@ class PlannerNode(Node):
             check=lambda request: None,
             start=self._begin,
             cancel=self._canceled,
-            preempt=lambda: self._canceled("a new request replaces this one"),
+            preempt=self._preempt,
         )
         self.create_service(PlanRobotPath, "/plan_robot_path", self._on_robot_path)
         self._watchdog = self.create_timer(
@@ -223,6 +223,10 @@ class PlannerNode(Node):
         self._work = None
         self.failures += 1
         self._server.finish(PlanPush.Result(error_code=code, error_msg=message), success=False)
+
+    def _preempt(self) -> None:
+        if self._server.active:
+            self._canceled("a new request replaces this one")
 
     def _canceled(self, why: str = "canceled") -> None:
         self._pending = False

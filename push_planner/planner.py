@@ -131,6 +131,8 @@ class PushPlanner:
         base = self.settings.seed if seed is None else seed
         left = self.settings.total_expansions
         for round_number in range(1 + self.settings.improvement_rounds):
+            if left <= 0:
+                break
             weight = max(1.0, self.settings.heuristic_weight / 2.0**round_number)
             guides = []
             for guide in self._guides(start, goal, base + round_number):

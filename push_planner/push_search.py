@@ -8,7 +8,8 @@ loses plans: where the far ones lead nowhere, the near ones are never tried. Her
 one waypoint at a time (partial expansion A*): it goes back into the queue with the least cost that
 its next waypoint can have. No push is lost, and far ones are still tried first. The distance to
 the start is weighted, so that a first plan is found early; later searches are less greedy, and drop
-what cannot be shorter than the best plan so far.
+what cannot be shorter than the best plan so far. A node is settled by its first expansion, as in
+any weighted A*: plans are good, not optimal.
 """
 
 import heapq
@@ -101,6 +102,7 @@ class PushSearch:
             self._distances(poses[-2]),
             np.full(1, way[-1]),
         ]
+        direct = [self._distances(p) for p in poses]  # never more than what is left, to prune with
         # estimate, tie-break, node, waypoint to push from next
         queue = [(float(way[-1]), next(counter), root, 0)]
         settled: set[tuple[int, int, int]] = set()
@@ -115,28 +117,29 @@ class PushSearch:
                     self.solution, self.cost = self._trace(node), node.cost
                     return
             self.statistics.expanded += 1
-            remaining = rest[waypoint]
             for child in self._successors(
-                node, poses[waypoint], starts[waypoint], remaining, waypoint
+                node, poses[waypoint], starts[waypoint], direct[waypoint], waypoint
             ):
                 self.statistics.generated += 1
                 key = (*child.place, child.side.index if child.side else -1)
-                h = float(remaining[child.place[1]])
-                if key not in settled and child.cost + h < self.bound:
+                h = float(rest[waypoint][child.place[1]])
+                if key not in settled:
                     f = child.cost + self.weight * h
                     heapq.heappush(queue, (f, next(counter), child, 0))
-            following = waypoint + 1
-            if following < node.place[0] and poses[following]:
-                ahead = np.array(poses[following])[:, :2] - node.pose[:2]
-                ahead_way, to_start = np.hypot(*ahead.T), rest[following]
-                if node.cost + float((ahead_way + to_start).min()) < self.bound:
-                    least = node.cost + float((ahead_way + self.weight * to_start).min())
+            for following in range(waypoint + 1, node.place[0]):
+                if not poses[following]:
+                    continue
+                way = np.hypot(*(np.array(poses[following])[:, :2] - node.pose[:2]).T)
+                if node.cost + float((way + direct[following]).min()) < self.bound:
+                    least = node.cost + float((way + self.weight * rest[following]).min())
                     entry = (max(estimate, least), next(counter), node, following)
                     heapq.heappush(queue, entry)
+                    break
             yield
 
     def _distances(self, poses: list[Array]) -> Array:
-        return np.array([np.hypot(*(p - self.start)[:2]) for p in poses])
+        way: Array = np.hypot(*(np.array(poses).reshape(-1, 3) - self.start)[:, :2].T)
+        return way
 
     def _runs(self, pose: Array, sign: float) -> list[Array]:
         """Object poses a straight push before (sign -1) or after (+1) a pose, on every side.
@@ -196,7 +199,7 @@ class PushSearch:
         waypoint: int,
     ) -> Iterator[_Node]:
         """Pushes from the poses at one waypoint that end at the node, as far as they can be part of
-        a solution below the bound; remaining: of each pose, the way to the start."""
+        a solution below the bound; remaining: of each pose, the distance to the start."""
         for side, robots in zip(self.scene.sides, starts, strict=True):
             end = side.robot_pose(node.pose)
             way = np.hypot(*(robots[:, :2] - end[:2]).T)

@@ -28,9 +28,9 @@ class GoalServer:
     check: raises an exception whose text is logged when the goal must be rejected.
     refuse: result for a goal that is accepted only to be told why it cannot be; None where it can.
     A goal that is rejected or refused leaves the one under way alone.
-    preempt: called when a new goal replaces the one under way, which the owner ends with
-    ``finish``. start: called with the new goal's request. cancel: called when the goal under way
-    shall end; the owner answers with ``finish``.
+    preempt: called before a new goal is taken; the owner ends what is under way, whoever asked for
+    it, and a goal of this server with ``finish``. start: called with the new goal's request.
+    cancel: called when the goal under way shall end; the owner answers with ``finish``.
     """
 
     def __init__(
@@ -79,8 +79,7 @@ class GoalServer:
         if refusal is not None:
             self._server.deliver(handle, lambda h: self._deliver(h, refusal, False))
             return
-        if self._handle is not None:
-            self._preempt()
+        self._preempt()
         self._handle = handle
         self._start(handle.request)
 

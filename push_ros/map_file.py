@@ -11,12 +11,13 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, UnidentifiedImageError
+from PIL import Image
 
 from push_model.occupancy import MapSpec, OccupancyGrid
 from push_model.settings import SettingsError, bounded, from_mapping
 
 _DATA = "data:image/png;base64,"
+_MODES = ("1", "L", "LA", "P", "RGB", "RGBA")  # of 8 bits a channel
 _MAX_CELLS = 4_000_000
 
 
@@ -122,9 +123,13 @@ def _pixels(path: Path | BytesIO, where: str) -> tuple[NDArray[np.float64], NDAr
                 )
             if min(image.width, image.height) < 3:
                 raise SettingsError(f"{where}.image: {path} has fewer than 3 x 3 cells")
+            if image.mode not in _MODES:
+                raise SettingsError(
+                    f"{where}.image: {path} has pixels of kind {image.mode}; save it with 8 bits"
+                )
             colour = np.asarray(image.convert("RGBA"), dtype=np.float64)
     except FileNotFoundError:
         raise SettingsError(f"{where}.image: {path} does not exist") from None
-    except (OSError, ValueError, SyntaxError, UnidentifiedImageError) as error:
+    except (OSError, SyntaxError, Image.DecompressionBombError) as error:
         raise SettingsError(f"{where}.image: {path} is no readable image: {error}") from None
     return colour[:, :, :3].mean(axis=2), colour[:, :, 3] < 128

@@ -205,8 +205,7 @@ class SupervisorNode(Node):
         except GoalRefused as refusal:
             self._say_no(refusal)
             return
-        if self._job.active:
-            self._preempt()
+        self._preempt()
         self._take_goal(goal, False)
 
     def _refuse_job(self, request: Any) -> Any:
@@ -244,7 +243,9 @@ class SupervisorNode(Node):
         self._publish_state()
 
     def _preempt(self) -> None:
-        self._fire(Event.ABORT, code=JobError.PREEMPTED, message="a new goal replaces this one")
+        if self.machine.busy or self.machine.plan_ready:
+            why = "a new goal replaces this one"
+            self._fire(Event.ABORT, code=JobError.PREEMPTED, message=why)
 
     def _take_goal(self, goal: Array, plan_only: bool) -> None:
         self._fire(Event.GOAL, goal=goal, plan_only=plan_only)

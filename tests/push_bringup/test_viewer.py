@@ -3,6 +3,7 @@
 import http.client
 import json
 import math
+import socket
 import threading
 
 import numpy as np
@@ -53,7 +54,11 @@ class Page:
 
         def run():
             connection = http.client.HTTPConnection("127.0.0.1", self.server.port, timeout=5)
-            connection.request(method, path, body, headers or {})
+            if method == "POST":
+                headers_ = {"Content-Type": "application/json", **(headers or {})}
+                connection.request(method, path, body or "", headers_)
+            else:
+                connection.request(method, path)
             answer = connection.getresponse()
             data = answer.readline() if path == "/events" else answer.read()
             result.append((answer.status, answer.getheader("Content-Type"), data))
@@ -132,10 +137,39 @@ def test_a_goal_that_is_none_is_refused(page, body):
     assert page.goals == []
 
 
-def test_other_sites_cannot_move_the_robot(page):
-    headers = {"Origin": "http://evil.example"}
-    goal = json.dumps({"x": 1.0, "y": 0.5, "theta": 0.3})
-    assert page.ask("POST", "/goal", goal, headers)[0] == 403
+GOAL = json.dumps({"x": 1.0, "y": 0.5, "theta": 0.3})
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"Origin": "http://evil.example"},
+        {"Origin": "http://evil.example:8080", "Host": "evil.example:8080"},
+        {"Content-Type": "text/plain"},
+        {"Content-Length": "many"},
+    ],
+)
+def test_other_sites_cannot_move_the_robot(page, headers):
+    """Also where a name of theirs leads here, or where their form is sent without asking."""
+    assert page.ask("POST", "/goal", GOAL, headers)[0] == 403
     own = {"Origin": f"http://127.0.0.1:{page.server.port}"}
-    assert page.ask("POST", "/goal", goal, own)[0] == 202
+    assert page.ask("POST", "/goal", GOAL, own)[0] == 202
     assert page.spinner.until(lambda: page.goals, 5.0) and len(page.goals) == 1
+
+
+def test_the_body_of_a_refused_request_is_not_taken_for_another(page):
+    length = f"Content-Length: {len(GOAL)}"
+    own = f"Host: 127.0.0.1:{page.server.port}\r\nContent-Type: application/json"
+    inner = f"POST /goal HTTP/1.1\r\n{own}\r\n{length}\r\n\r\n{GOAL}"
+    outer = (
+        f"POST /goal HTTP/1.1\r\nOrigin: http://evil.example\r\n{own}\r\n"
+        f"Content-Length: {len(inner)}\r\n\r\n{inner}"
+    )
+    with socket.create_connection(("127.0.0.1", page.server.port), timeout=5) as connection:
+        connection.sendall(outer.encode())
+        answers = b""
+        while chunk := connection.recv(4096):
+            answers += chunk
+    assert answers.count(b"HTTP/1.1") == 1 and b"403" in answers
+    page.spinner.until(lambda: bool(page.goals), 0.3)
+    assert page.goals == []

@@ -139,8 +139,7 @@ def test_nan_input_is_a_failure_that_leaves_no_trace(where):
 
 @given(st.integers(0, 10**6))
 def test_obstacle_rows_are_half_planes_with_the_unit_normal(seed):
-    """Errata (2.59)-(2.60): n'p <= n'o - delta, n the unit vector from robot to obstacle. As
-    printed, with q_i without the obstacle's centre, the plane lies elsewhere."""
+    """Errata (2.59)-(2.60): n'p <= n'o - delta, n the unit vector from robot to obstacle."""
     random = np.random.default_rng(seed)
     x, y, theta = random.uniform(-1, 1, 3)
     o = np.array([x, y]) + random.uniform(0.1, 0.5) * np.array([np.cos(seed), np.sin(seed)])
@@ -156,5 +155,10 @@ def test_obstacle_rows_are_half_planes_with_the_unit_normal(seed):
     assert n == pytest.approx((o - p) / np.linalg.norm(o - p))
     # the row holds for errors e in the reference frame: p = reference + R e
     assert qp.bound[0, row] == pytest.approx(n @ o - delta - n @ p)
-    printed = delta * (p - o) / np.linalg.norm(p - o)
-    assert abs(n @ printed - (n @ o - delta)) == pytest.approx(abs(n @ o), abs=1e-9)
+
+
+def test_more_obstacles_than_there_are_rows_for_are_refused():
+    mpc = LtvMpc(replace(MpcSettings(), max_obstacles=0), DRIVE)
+    assert mpc.solve(np.zeros(5), straight(), None, NONE).solved
+    with pytest.raises(ValueError, match="at most 0"):
+        mpc.solve(np.zeros(5), straight(), None, np.array([[1.0, 0.0, 0.5]]))

@@ -110,6 +110,13 @@ def test_a_waypoint_that_leads_nowhere_hides_no_other(planner):
     assert plan.statistics.nodes_expanded > 20
 
 
+def test_a_waypoint_without_a_pose_ends_no_search(scenario, robot, box):
+    """Without straight runs the waypoints next to start and goal are empty."""
+    bare = PushPlanner(replace(PlannerSettings(), run_lengths=()), scenario.grid, robot, box)
+    plan = bare.solve(START, GOAL)
+    assert plan.segments[-1].object_end == pytest.approx(GOAL)
+
+
 def test_bearings_rule_out_only_pushes_that_must_loop():
     """The quick test against the solver: what it rules out has no curve without a loop."""
     random = np.random.default_rng(4)

@@ -15,7 +15,11 @@ FREE, GREY, WALL = 254, 205, 0
 def write(folder, pixels, suffix="pgm", **keys):
     """A map and a scenario in it; the path of the scenario."""
     Image.fromarray(np.asarray(pixels, dtype=np.uint8)).save(folder / f"room.{suffix}")
-    values = {"image": f"room.{suffix}", "resolution": 0.05, "origin": [-1.0, -0.5, 0.0]}
+    return write_yaml(folder, **{"image": f"room.{suffix}", **keys})
+
+
+def write_yaml(folder, **keys):
+    values = {"resolution": 0.05, "origin": [-1.0, -0.5, 0.0]}
     (folder / "room.yaml").write_text(yaml.safe_dump({**values, **keys}))
     scenario = {
         "environment": "room.yaml",
@@ -124,6 +128,9 @@ def test_broken_and_tiny_images_are_refused(tmp_path):
     (tmp_path / "room.pgm").write_bytes(whole[: len(whole) // 2])
     with pytest.raises(SettingsError, match="no readable image"):
         load_scenario(path)
+    Image.fromarray(np.full((9, 9), 20000, dtype=np.uint16)).save(tmp_path / "room.png")
+    with pytest.raises(SettingsError, match="8 bits"):
+        load_scenario(write_yaml(tmp_path, image="room.png"))
     with pytest.raises(SettingsError, match="no free cell"):
         load_scenario(write(tmp_path, np.full((9, 9), WALL)))
     with pytest.raises(SettingsError, match="fewer than 3 x 3"):

@@ -145,6 +145,14 @@ def test_a_goal_on_the_topic_replaces_an_action_and_is_reached(jobs):
     assert jobs.run.observer.trace.object[-1][:2] == pytest.approx(jobs.goal[:2], abs=0.02)
 
 
+def test_an_action_goal_takes_over_from_a_goal_on_the_topic(jobs):
+    jobs.run.observer.send_goal(jobs.goal + [0.1, 0.0, 0.0])
+    jobs.pushing()
+    status, result = jobs.result(jobs.send(jobs.goal))
+    assert status == GoalStatus.STATUS_SUCCEEDED and result.error_code == 0
+    assert jobs.run.observer.trace.object[-1][:2] == pytest.approx(jobs.goal[:2], abs=0.02)
+
+
 def test_the_same_goal_again_is_answered_again(jobs):
     assert jobs.run.reach(jobs.goal).error_code == 0
     again = jobs.run.reach(jobs.goal)
