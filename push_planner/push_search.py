@@ -129,9 +129,9 @@ class PushSearch:
             for following in range(waypoint + 1, node.place[0]):
                 if not poses[following]:
                     continue
-                way = np.hypot(*(np.array(poses[following])[:, :2] - node.pose[:2]).T)
-                if node.cost + float((way + direct[following]).min()) < self.bound:
-                    least = node.cost + float((way + self.weight * rest[following]).min())
+                gap = np.hypot(*(np.array(poses[following])[:, :2] - node.pose[:2]).T)
+                if node.cost + float((gap + direct[following]).min()) < self.bound:
+                    least = node.cost + float((gap + self.weight * rest[following]).min())
                     entry = (max(estimate, least), next(counter), node, following)
                     heapq.heappush(queue, entry)
                     break
