@@ -108,7 +108,9 @@ def _goal(arguments: argparse.Namespace) -> int:
             )
             return 1
         monitor.send_goal((arguments.x, arguments.y, arguments.theta))
-        return 0 if arguments.no_wait else monitor.follow(arguments.timeout, lambda: True)
+        if arguments.no_wait:
+            return 0
+        return monitor.follow(arguments.timeout, lambda: monitor.supervised)
 
 
 def _demo(arguments: argparse.Namespace) -> int:

@@ -73,12 +73,17 @@ class Monitor:
                 and self._map
                 and self.position is not None
                 and self._publisher.get_subscription_count() > 0
-                and self._node.count_publishers("/supervisor/state") > 0
+                and self.supervised
             )
             if ready:
                 return True
             self._spinner.once(0.05)
         return False
+
+    @property
+    def supervised(self) -> bool:
+        """Whether there is a supervisor; one that was killed is missed after some seconds."""
+        return int(self._node.count_publishers("/supervisor/state")) > 0
 
     def send_goal(self, goal: tuple[float, float, float]) -> None:
         """Publish a goal (x, y, theta) [m, m, rad]."""

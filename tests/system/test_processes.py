@@ -271,6 +271,28 @@ def test_demo_ends_with_bag_pictures_and_report(domain, tmp_path):
         assert (tmp_path / "demo" / name).stat().st_size > 1000, name
 
 
+def test_goal_ends_with_the_suite(domain):
+    """Nobody waits for an answer that cannot come."""
+    launcher = Launcher(single_robot("short"), False, lambda text: None)
+    launcher.start()
+    try:
+        words = ["goal", "0.1", "0.04", "0.1"]
+        process = subprocess.Popen(
+            [sys.executable, "-m", "push_bringup.cli", *words],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        for line in process.stdout:
+            if "planning" in line:
+                break
+        launcher.stop()
+        _, error = process.communicate(timeout=20.0)
+    finally:
+        launcher.stop()
+    assert process.returncode == 1 and "ended before the job" in error
+
+
 def test_wrong_words_are_answered_with_what_to_do():
     done = subprocess.run(
         [sys.executable, "-m", "push_bringup.cli", "launch", "single", "--scenario", "atlantis"],
