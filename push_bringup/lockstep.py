@@ -18,7 +18,7 @@ from push_mpc.node import ControllerNode
 from push_msgs.msg import Contacts, ControllerStatus, NamedPoses, PushPlan, SupervisorState
 from push_planner.node import PlannerNode
 from push_ros.conversions import pose_stamped_to_ros, time_from_ros
-from push_ros.process import Spinner, claim_domain, prepare_environment
+from push_ros.process import Spinner, claim_domain, prepare_environment, reaches
 from push_ros.qos import COMMAND, LATCHED, STATUS, STREAM
 from push_ros.scenario import Scenario
 from push_ros.validation import planar_pose
@@ -67,7 +67,7 @@ class Observer(Node):
     @property
     def connected(self) -> bool:
         """Whether a goal would be received."""
-        return int(self._goal_publisher.get_subscription_count()) > 0
+        return reaches(self, self._goal_publisher, "supervisor")
 
     def send_goal(self, goal: Array) -> None:
         """Publish a goal ``(3,)`` on /goal_pose."""

@@ -12,7 +12,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from push_msgs.msg import NamedPoses, SupervisorState
 from push_ros.conversions import pose_stamped_to_ros, time_from_ros
-from push_ros.process import Spinner, prepare_environment
+from push_ros.process import Spinner, prepare_environment, reaches
 from push_ros.qos import COMMAND, LATCHED, STREAM
 
 
@@ -72,7 +72,7 @@ class Monitor:
                 self.state is not None
                 and self._map
                 and self.position is not None
-                and self._publisher.get_subscription_count() > 0
+                and reaches(self._node, self._publisher, "supervisor")
                 and self.supervised
             )
             if ready:

@@ -65,6 +65,16 @@ def claim_domain() -> int:
     raise RuntimeError("all hundred ROS domains for lockstep runs are in use")
 
 
+def reaches(node: Node, publisher: Any, name: str) -> bool:
+    """Whether what a publisher of the node sends now is heard by the node called ``name``.
+
+    A count of subscriptions is not enough: it may be the recorder's.
+    """
+    known = node.get_subscriptions_info_by_topic(publisher.topic_name)
+    heard = any(info.node_name == name for info in known)
+    return heard and int(publisher.get_subscription_count()) >= len(known)
+
+
 class Spinner:
     """An executor for some nodes, spun by its owner."""
 
