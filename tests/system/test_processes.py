@@ -94,8 +94,7 @@ def test_killed_node(domain, victim, respawn, tmp_path):
 def test_a_planner_killed_at_work_is_asked_again(domain):
     """FAULTS 11: it dies with the request; the one started in its place gets it anew."""
     said = []
-    impatient = {"supervisor": ["--ros", "-p", "answer_timeout:=4.0"], "bridge": FACTOR}
-    launcher = Launcher(single_robot("short", "", impatient), True, said.append)
+    launcher = Launcher(single_robot("short", "", {"bridge": FACTOR}), True, said.append)
     launcher.start()
     try:
         with Monitor() as monitor:
