@@ -147,7 +147,8 @@ class TrajectoryTracker:
         error = self._error(robot, reference)
         self._lag = -float(error[0])
         gap, turn = self._final_errors(task, robot, item)
-        margin = self._obstacle_margin(task, robot)
+        room = self._room(task, robot)
+        margin = float(room.min(initial=math.inf))
         offset = (
             0.0
             if task.push is None or self._grasp is None
@@ -170,7 +171,7 @@ class TrajectoryTracker:
         if finished:
             self.stop()
         else:
-            solve = self._solve(task, robot, error, reference, limits)
+            solve = self._solve(error, reference, limits, self._nearest(task, room))
             self._apply(solve, dt, limits)
             if self._bad >= _SOLVER_PATIENCE:
                 finished, code, message = True, TrackError.SOLVER_FAILED, solve.reason
@@ -197,15 +198,14 @@ class TrajectoryTracker:
 
     def _solve(
         self,
-        task: Task,
-        robot: Array,
         error: Array,
         reference: Reference,
         limits: CurvatureLimits | None,
+        circles: Array,
     ) -> MpcResult:
         """Solve; an answer after the deadline is as bad as none."""
         started = time.perf_counter()
-        solve = self.mpc.solve(error, reference, limits, self._nearest(task, robot))
+        solve = self.mpc.solve(error, reference, limits, circles)
         late = time.perf_counter() - started
         if solve.solved and 0.0 < self.settings.deadline < late:
             return replace(solve, solved=False, late=True, reason=f"late: {1e3 * late:.1f} ms")
@@ -329,23 +329,20 @@ class TrajectoryTracker:
             self._commanded = 0.0
         return TrackError.NONE, ""
 
-    def _nearest(self, task: Task, robot: Array) -> Array:
+    def _room(self, task: Task, robot: Array) -> Array:
+        """``(m,)`` [m] of the robot to each obstacle's boundary."""
+        c = task.circles
+        room: Array = np.hypot(c[:, 0] - robot[0], c[:, 1] - robot[1]) - c[:, 2]
+        return room
+
+    def _nearest(self, task: Task, room: Array) -> Array:
+        """The obstacles ``(n, 3)`` within reach, no more than the QP has rows for."""
         count = self.mpc.settings.max_obstacles
-        circles = task.circles
-        if len(circles) == 0 or count == 0:
-            return _NO_CIRCLES
-        room = np.hypot(circles[:, 0] - robot[0], circles[:, 1] - robot[1]) - circles[:, 2]
         reach = 1.5 * self.mpc.drive.max_speed * self.mpc.settings.step * self.mpc.settings.horizon
         close = np.flatnonzero(room < reach)
         if len(close) > count:
             close = close[np.argpartition(room[close], count)[:count]]
-        return np.ascontiguousarray(circles[close])
-
-    def _obstacle_margin(self, task: Task, robot: Array) -> float:
-        if len(task.circles) == 0:
-            return math.inf
-        c = task.circles
-        return float((np.hypot(c[:, 0] - robot[0], c[:, 1] - robot[1]) - c[:, 2]).min())
+        return np.ascontiguousarray(task.circles[close])
 
     def _apply(self, solve: MpcResult, dt: float, limits: CurvatureLimits | None) -> None:
         """Algorithm 3: integrate the acceleration; without a solution stop, when late fade."""

@@ -94,15 +94,15 @@ class PushSearch:
         last = len(poses) - 1
         root = _Node(self.goal, (last, -1), None, 0.0, math.inf)
         counter = itertools.count()
+        direct = [self._distances(p) for p in poses]  # never more than what is left, to prune with
         # h of (2.11); for the straight runs off Gamma, the distance to the start
         rest = [
-            np.zeros(1),
-            self._distances(poses[1]),
+            direct[0],
+            direct[1],
             *(np.full(len(p), w) for p, w in zip(poses[2:-2], way[1:-1], strict=True)),
-            self._distances(poses[-2]),
+            direct[-2],
             np.full(1, way[-1]),
         ]
-        direct = [self._distances(p) for p in poses]  # never more than what is left, to prune with
         # estimate, tie-break, node, waypoint to push from next
         queue = [(float(way[-1]), next(counter), root, 0)]
         settled: set[tuple[int, int, int]] = set()
