@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.measure import at_least, at_most
 from push_model import contact_on_side, curvature_limits, se2
 from push_model.specs import EnvironmentSpec, ObjectSpec
-from push_ros.scenario import load_scenario
+from push_scenario.scenario import load_scenario
 from sim_bridge.world import World
 
 INSIDE, OUTSIDE = 0.92, 1.15  # of the limiting curvature

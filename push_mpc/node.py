@@ -9,6 +9,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from std_msgs.msg import Header
 
+from push_estimation.pose_gate import PoseGate, PoseGateSettings, Stamp
 from push_model.kinematics import unicycle_step
 from push_model.settings import SettingsError
 from push_mpc import (
@@ -32,10 +33,9 @@ from push_ros.conversions import (
 )
 from push_ros.diagnostics import Diagnostics
 from push_ros.parameters import declare_settings
-from push_ros.pose_tracker import PoseTracker, PoseTrackerSettings, Stamp
 from push_ros.qos import COMMAND, STATUS, STREAM
-from push_ros.scenario import Scenario, load_scenario
 from push_ros.validation import FRAME, InvalidMessage, check_frame, finite, planar_pose
+from push_scenario.scenario import Scenario, load_scenario
 
 _GIVE_UP = 5.0  # [s] without poses until a task is given up
 _AHEAD = 1.0  # [s] that a heartbeat's stamp may lie ahead of the poses
@@ -69,10 +69,8 @@ class ControllerNode(Node):
             self._apply_tracker,
         )
         self._rebuild()
-        self._poses = PoseTracker(
-            declare_settings(
-                self, PoseTrackerSettings, sections["poses"], "poses", "controller.poses"
-            )
+        self._poses = PoseGate(
+            declare_settings(self, PoseGateSettings, sections["poses"], "poses", "controller.poses")
         )
         self._object = ""
         self._heartbeat = self._heartbeat_wall = 0.0

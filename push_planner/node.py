@@ -36,8 +36,8 @@ from push_ros.conversions import (
 from push_ros.diagnostics import Diagnostics
 from push_ros.parameters import declare_settings
 from push_ros.qos import LATCHED
-from push_ros.scenario import Scenario, load_scenario
 from push_ros.validation import FRAME, InvalidMessage, planar_pose
+from push_scenario.scenario import Scenario, load_scenario
 
 _SIGN_OF_LIFE = 0.5  # [s] wall time between feedback messages at most
 _MAP_PATIENCE = 5.0  # [s] wall time that a request waits for the first map

@@ -14,6 +14,7 @@ from rclpy.serialization import deserialize_message
 from std_msgs.msg import Header, String
 from std_srvs.srv import Trigger
 
+from push_estimation.pose_gate import PoseGate, PoseGateSettings, Stamp
 from push_model import se2
 from push_model.arrays import Array
 from push_model.occupancy import OccupancyGrid as Grid
@@ -37,10 +38,9 @@ from push_ros.conversions import (
 )
 from push_ros.diagnostics import Diagnostics
 from push_ros.parameters import declare_settings
-from push_ros.pose_tracker import PoseTracker, PoseTrackerSettings, Stamp
 from push_ros.qos import COMMAND, LATCHED, STREAM
-from push_ros.scenario import Scenario, load_scenario
 from push_ros.validation import FRAME, InvalidMessage, planar_pose, stamped_pose
+from push_scenario.scenario import Scenario, load_scenario
 from push_supervisor import (
     Command,
     Event,
@@ -94,8 +94,8 @@ class SupervisorNode(Node):
             "planner",
             "planner",
         )
-        self._poses = PoseTracker(
-            declare_settings(self, PoseTrackerSettings, poses, "poses", "supervisor.poses")
+        self._poses = PoseGate(
+            declare_settings(self, PoseGateSettings, poses, "poses", "supervisor.poses")
         )
         self._object_radius = self._object_spec.geometry.circumradius
         self.machine = Machine(self.settings, self._at_goal)

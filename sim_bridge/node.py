@@ -27,8 +27,8 @@ from push_ros.conversions import (
 from push_ros.diagnostics import Diagnostics
 from push_ros.parameters import declare_settings
 from push_ros.qos import CLOCK, COMMAND, LATCHED, STATUS, STREAM
-from push_ros.scenario import Scenario, load_scenario
 from push_ros.validation import FRAME
+from push_scenario.scenario import Scenario, load_scenario
 from sim_bridge.markers import body_markers
 from sim_bridge.motion_capture import MotionCapture
 from sim_bridge.pace import Lockstep, RealTime

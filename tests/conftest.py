@@ -6,7 +6,7 @@ from hypothesis import HealthCheck, settings
 from PIL import Image
 
 from push_ros.process import claim_domain, prepare_environment
-from push_ros.scenario import config_directory, load_scenario
+from push_scenario.scenario import config_directory, load_scenario
 
 claim_domain()  # every run of the tests has a domain of its own
 prepare_environment()

@@ -11,12 +11,12 @@ from rclpy.action import ActionClient
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Header
 
-from push_bringup.lockstep import LockstepRun
 from push_msgs.action import FollowTrajectory, MoveObject, PlanPush
 from push_msgs.msg import NamedPose, NamedPoses
 from push_msgs.srv import LoadScenario, PlanRobotPath, Reset
 from push_ros.qos import COMMAND, LATCHED, STATUS, STREAM
-from push_ros.scenario import load_scenario
+from push_scenario.scenario import load_scenario
+from push_study.graph_run import LockstepRun
 
 SPECIAL = [0.0, -1.0, 1.0, 1e-300, 1e300, math.nan, math.inf, -math.inf, 0.3]
 INPUTS = {

@@ -9,13 +9,13 @@ from geometry_msgs.msg import PoseStamped
 from rclpy.action import ActionClient
 from std_srvs.srv import SetBool
 
-from push_bringup.lockstep import LockstepRun
 from push_msgs.action import MoveObject
 from push_msgs.msg import SupervisorState
 from push_msgs.srv import LoadScenario
 from push_ros.conversions import pose_stamped_to_ros
 from push_ros.qos import COMMAND
-from push_ros.scenario import config_directory, load_scenario
+from push_scenario.scenario import config_directory, load_scenario
+from push_study.graph_run import LockstepRun
 
 
 class Jobs:

@@ -14,12 +14,13 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
-from push_bringup.lockstep import LockstepRun, final_errors
 from push_msgs.action import MoveObject
 from push_msgs.msg import SupervisorState
 from push_ros.conversions import pose_stamped_to_ros
 from push_ros.qos import COMMAND, LATCHED
-from push_ros.scenario import load_scenario
+from push_scenario.scenario import load_scenario
+from push_study.graph_run import LockstepRun
+from push_study.observer import final_errors
 from tf2_msgs.msg import TFMessage
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))

@@ -11,10 +11,10 @@ import pytest
 import yaml
 from mcap.reader import make_reader
 
-from push_bringup.bag import bag_file, read_bag
 from push_bringup.launcher import Child, Launcher, single_robot
 from push_bringup.monitor import Monitor
 from push_msgs.msg import SupervisorState
+from push_record.bag import bag_file, read_bag
 from push_ros.process import claim_domain
 
 FACTOR = ["--ros", "-p", "real_time_factor:=3.0"]
@@ -120,7 +120,7 @@ def test_signals_at_random_moments(domain, number, seed, tmp_path):
         [
             sys.executable,
             "-m",
-            "push_bringup.cli",
+            "planar_push.cli",
             "launch",
             "single",
             "--scenario",
@@ -157,7 +157,7 @@ def test_signals_end_a_demo(domain, number, tmp_path):
     """FAULTS 18, in the middle of a push."""
     words = ["demo", "--scenario", "short", "--out", str(tmp_path / "demo")]
     process = subprocess.Popen(
-        [sys.executable, "-m", "push_bringup.cli", *words],
+        [sys.executable, "-m", "planar_push.cli", *words],
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         text=True,
@@ -214,7 +214,7 @@ def test_a_wrong_parameter_on_the_command_line_is_an_error_not_a_traceback(domai
     """FAULTS 20."""
     words = ["node", "bridge", "--scenario", "short", "--ros", "-p", f"real_time_factor:={value}"]
     done = subprocess.run(
-        [sys.executable, "-m", "push_bringup.cli", *words],
+        [sys.executable, "-m", "planar_push.cli", *words],
         capture_output=True,
         text=True,
         timeout=60,
@@ -250,7 +250,7 @@ def test_demo_ends_with_bag_pictures_and_report(domain, tmp_path):
         [
             sys.executable,
             "-m",
-            "push_bringup.cli",
+            "planar_push.cli",
             "demo",
             "--scenario",
             "short",
@@ -277,7 +277,7 @@ def test_goal_ends_with_the_suite(domain):
     try:
         words = ["goal", "0.1", "0.04", "0.1"]
         process = subprocess.Popen(
-            [sys.executable, "-m", "push_bringup.cli", *words],
+            [sys.executable, "-m", "planar_push.cli", *words],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -294,7 +294,7 @@ def test_goal_ends_with_the_suite(domain):
 
 def test_wrong_words_are_answered_with_what_to_do():
     done = subprocess.run(
-        [sys.executable, "-m", "push_bringup.cli", "launch", "single", "--scenario", "atlantis"],
+        [sys.executable, "-m", "planar_push.cli", "launch", "single", "--scenario", "atlantis"],
         capture_output=True,
         text=True,
         timeout=60,

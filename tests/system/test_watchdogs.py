@@ -20,7 +20,7 @@ from push_ros.conversions import (
 )
 from push_ros.process import Spinner
 from push_ros.qos import COMMAND, STREAM
-from push_ros.scenario import load_scenario
+from push_scenario.scenario import load_scenario
 
 PLACE = np.array([-0.7, 0.0, 0.0])
 

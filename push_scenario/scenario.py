@@ -15,7 +15,7 @@ from push_model.arrays import Array
 from push_model.occupancy import MapSpec, OccupancyGrid, rasterise
 from push_model.settings import SettingsError, from_mapping
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
-from push_ros.map_file import is_map, load_map, map_to_mapping
+from push_scenario.map_file import is_map, load_map, map_to_mapping
 
 NODES = ("bridge", "planner", "controller", "supervisor")
 """Nodes that a scenario may have parameters for."""

@@ -13,26 +13,23 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from push_bringup.lockstep import LockstepRun, Trace, final_errors
-from push_bringup.recorder import RecorderNode, revision
-from push_bringup.report import draw_map, outlines_of, write_report
-from push_bringup.trials import Row, run_trials
 from push_model import se2
 from push_model.arrays import Array
 from push_planner import DistanceField, PlannerSettings, PushScene
+from push_record.recorder import RecorderNode, revision
 from push_ros.process import claim_domain
-from push_ros.scenario import Scenario, load_scenario
+from push_scenario.scenario import Scenario, load_scenario
+from push_study.graph_run import LockstepRun
+from push_study.observer import Trace, final_errors
+from push_study.summary import aggregate
+from push_study.thesis import TABLE_2_1
+from push_study.trials import Row, run_trials
+from push_view.report import draw_map, outlines_of, write_report
 
 SUCCESS_POSITION = 0.02
 """[m] of the object at the end."""
 SUCCESS_ORIENTATION = 0.1
 """[rad]."""
-
-THESIS = {  # Table 2.1: mean and worst position [m] and orientation [rad] error
-    "env1-target1": (0.0130, 0.0200, 0.0456, 0.0622),
-    "env1-target2": (0.0269, 0.0585, 0.0698, 0.0985),
-    "env1-target3": (0.0114, 0.0292, 0.0365, 0.0476),
-}
 
 
 @dataclass(frozen=True)
@@ -153,28 +150,6 @@ def single_robot_trial(task: SingleRobotTask) -> Row:
     }
 
 
-def aggregate(rows: list[Row]) -> dict[str, Any]:
-    """Success as a fraction; mean, standard deviation and maximum of every measure."""
-    result: dict[str, Any] = {
-        "trials": len(rows),
-        "success": sum(bool(r["success"]) for r in rows) / len(rows) if rows else 0.0,
-    }
-    names = [
-        k
-        for r in rows
-        for k, v in r.items()
-        if isinstance(v, (int, float)) and not isinstance(v, bool) and k != "seed"
-    ]
-    for name in dict.fromkeys(names):
-        values = np.array([r[name] for r in rows if name in r], dtype=np.float64)
-        result[name] = {
-            "mean": float(values.mean()),
-            "std": float(values.std()),
-            "max": float(values.max()),
-        }
-    return result
-
-
 def single_robot(
     scenarios: list[str], trials: int, seed: int, out: Path, scheduler: str = "", workers: int = 0
 ) -> dict[str, Any]:
@@ -223,7 +198,7 @@ def _print_table(rows: list[Row], scenarios: list[str]) -> None:
             continue
         p = 1e3 * np.array([r["position_error_m"] for r in mine])
         o = np.array([r["orientation_error_rad"] for r in mine])
-        known = THESIS.get(name)
+        known = TABLE_2_1.get(name)
         tp = f"{1e3 * known[0]:.1f}/{1e3 * known[1]:.1f}" if known else "-"
         to = f"{known[2]:.3f}/{known[3]:.3f}" if known else "-"
         print(

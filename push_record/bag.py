@@ -14,7 +14,7 @@ from mcap.records import Channel, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
-from push_bringup.interfaces import typestore
+from push_record.interfaces import typestore
 
 _CHUNK = 64 * 1024  # [bytes]
 _FLUSH_EVERY = 1.0  # [s] wall time

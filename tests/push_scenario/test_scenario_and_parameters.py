@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from push_model import SettingsError
 from push_model.occupancy import rasterise
-from push_ros.scenario import (
+from push_scenario.scenario import (
     config_directory,
     load_scenario,
     scenario_from_mapping,

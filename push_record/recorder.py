@@ -14,11 +14,11 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header, String
 from visualization_msgs.msg import MarkerArray
 
-from push_bringup.bag import BagWriter
 from push_msgs.msg import Contacts, ControllerStatus, NamedPoses, PushPlan, SupervisorState
+from push_record.bag import BagWriter
 from push_ros.conversions import time_from_ros
 from push_ros.qos import CLOCK, COMMAND, LATCHED, STATUS, STREAM
-from push_ros.scenario import Scenario
+from push_scenario.scenario import Scenario
 from tf2_msgs.msg import TFMessage
 
 

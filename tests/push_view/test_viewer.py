@@ -13,11 +13,11 @@ from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import OccupancyGrid
 from std_srvs.srv import Trigger
 
-from push_bringup.viewer import ViewerNode, ViewerServer
 from push_msgs.msg import NamedPose, NamedPoses, SupervisorState
 from push_ros.conversions import grid_to_ros, pose_to_ros, time_to_ros
 from push_ros.process import Spinner
 from push_ros.qos import COMMAND, LATCHED, STREAM
+from push_view.viewer import ViewerNode, ViewerServer
 
 
 class Page:

@@ -16,7 +16,7 @@ from push_model.settings import bounded
 
 
 @dataclass(frozen=True)
-class PoseTrackerSettings:
+class PoseGateSettings:
     """When a pose is too old or too far."""
 
     timeout: float = bounded(0.15, low=0.01, high=5.0, doc="[s] age at which a pose is stale")
@@ -47,14 +47,14 @@ class _Body:
     repeats: int = 0
 
 
-class PoseTracker:
+class PoseGate:
     """Gates the poses of named bodies.
 
     Counters: refused (non-finite pose or bad stamp), jumps (gated poses).
     """
 
-    def __init__(self, settings: PoseTrackerSettings | None = None) -> None:
-        self.settings = settings or PoseTrackerSettings()
+    def __init__(self, settings: PoseGateSettings | None = None) -> None:
+        self.settings = settings or PoseGateSettings()
         self.refused = 0
         self.jumps = 0
         self.reset()

@@ -10,8 +10,8 @@ from mcap.reader import make_reader
 from rclpy.serialization import serialize_message
 from rosbags.highlevel import AnyReader
 
-from push_bringup.bag import BagWriter, bag_file, read_bag, read_metadata, recover
 from push_msgs.msg import NamedPose, NamedPoses
+from push_record.bag import BagWriter, bag_file, read_bag, read_metadata, recover
 
 META = {"scenario": "a: 1", "seed": "7"}
 
@@ -59,7 +59,7 @@ def test_an_existing_bag_is_not_overwritten(tmp_path):
 def test_killed_writer_keeps_its_whole_chunks(tmp_path):
     code = (
         "import sys, os, signal; sys.path.insert(0, sys.argv[2]);\n"
-        "from tests.push_bringup.test_bag import write\n"
+        "from tests.push_record.test_bag import write\n"
         "from pathlib import Path\n"
         "w = write(Path(sys.argv[1]), 5000); w._file.flush(); os.kill(os.getpid(), signal.SIGKILL)"
     )

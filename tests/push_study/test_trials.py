@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from push_bringup.experiments import aggregate
-from push_bringup.trials import run_trials
+from push_study.experiments.single_robot import aggregate
+from push_study.trials import run_trials
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -51,8 +51,8 @@ def test_rows_come_in_the_order_of_the_tasks_and_failures_are_rows(tmp_path):
 def test_a_signal_keeps_finished_trials_and_leaves_no_process(tmp_path, number):
     """FAULTS 18 and 19."""
     code = (
-        "from tests.push_bringup.test_trials import Task, trial\n"
-        "from push_bringup.trials import run_trials\n"
+        "from tests.push_study.test_trials import Task, trial\n"
+        "from push_study.trials import run_trials\n"
         "if __name__ == '__main__':\n"
         "    from pathlib import Path\n"
         "    tasks = [Task(1), Task(2), Task(3, 'hang'), Task(4, 'hang'), Task(5)]\n"

@@ -26,13 +26,13 @@ from PIL import Image
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
-from push_bringup.report import outlines_of
 from push_model.occupancy import OccupancyGrid
 from push_msgs.msg import ControllerStatus, NamedPoses, SupervisorState
 from push_ros.conversions import grid_from_ros, pose_stamped_to_ros, time_from_ros
 from push_ros.qos import COMMAND, LATCHED, STATUS, STREAM
-from push_ros.scenario import Scenario
 from push_ros.validation import InvalidMessage, planar_pose
+from push_scenario.scenario import Scenario
+from push_view.report import outlines_of
 
 _PERIOD = 0.05  # [s] between events to a page
 _LONGEST = 10_000  # [bytes] of a request

@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from push_bringup.bag import read_metadata
-from push_bringup.experiments import single_robot
-from push_bringup.report import PRODUCTS
+from push_record.bag import read_metadata
+from push_study.experiments.single_robot import single_robot
+from push_view.report import PRODUCTS
 
 MEASURES = {
     "scenario",

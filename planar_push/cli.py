@@ -20,7 +20,7 @@ def _warm_up(arguments: argparse.Namespace) -> int:
 
     from push_mpc import LtvMpc, MpcSettings, TrackerSettings, TrajectoryTracker
     from push_planner import PlannerSettings, PushPlanner
-    from push_ros.scenario import load_scenario
+    from push_scenario.scenario import load_scenario
 
     print("compiling the numerical kernels")
     scenario = load_scenario("env1-target1")
@@ -36,7 +36,7 @@ def _warm_up(arguments: argparse.Namespace) -> int:
 def _node(arguments: argparse.Namespace) -> int:
     """Run one node in this process."""
     from push_ros.process import run_node
-    from push_ros.scenario import Scenario, load_scenario
+    from push_scenario.scenario import Scenario, load_scenario
 
     try:
         scenario: Scenario = load_scenario(arguments.scenario)
@@ -65,7 +65,7 @@ def _node(arguments: argparse.Namespace) -> int:
             from push_supervisor.node import SupervisorNode
 
             return SupervisorNode(scenario)
-        from push_bringup.recorder import RecorderNode
+        from push_record.recorder import RecorderNode
 
         seed = int(scenario.parameters.get("bridge", {}).get("seed", 1))
         return RecorderNode(Path(arguments.out), scenario, seed)
@@ -116,8 +116,8 @@ def _goal(arguments: argparse.Namespace) -> int:
 def _demo(arguments: argparse.Namespace) -> int:
     from push_bringup.launcher import Launcher, single_robot
     from push_bringup.monitor import Monitor
-    from push_bringup.report import PRODUCTS, write_report
-    from push_ros.scenario import load_scenario
+    from push_scenario.scenario import load_scenario
+    from push_view.report import PRODUCTS, write_report
 
     scenario = load_scenario(arguments.scenario)
     if scenario.goal is None:
@@ -180,9 +180,9 @@ def _record(arguments: argparse.Namespace) -> int:
 
 
 def _view(arguments: argparse.Namespace) -> int:
-    from push_bringup.viewer import ViewerNode, ViewerServer
     from push_ros.process import run_node
-    from push_ros.scenario import load_scenario
+    from push_scenario.scenario import load_scenario
+    from push_view.viewer import ViewerNode, ViewerServer
 
     scenario = load_scenario(arguments.scenario)
     server: ViewerServer | None = None
@@ -205,7 +205,7 @@ def _view(arguments: argparse.Namespace) -> int:
 
 
 def _report(arguments: argparse.Namespace) -> int:
-    from push_bringup.report import write_report
+    from push_view.report import write_report
 
     bag = Path(arguments.bag)
     out = Path(arguments.out) if arguments.out else bag.parent / f"{bag.name}-report"
@@ -222,7 +222,7 @@ def _report(arguments: argparse.Namespace) -> int:
 
 
 def _recover(arguments: argparse.Namespace) -> int:
-    from push_bringup.bag import recover
+    from push_record.bag import recover
 
     count = recover(Path(arguments.bag), Path(arguments.out))
     print(f"{count} messages recovered into {arguments.out}")
@@ -230,7 +230,7 @@ def _recover(arguments: argparse.Namespace) -> int:
 
 
 def _experiment(arguments: argparse.Namespace) -> int:
-    from push_bringup.experiments import single_robot
+    from push_study.experiments.single_robot import single_robot
 
     out = Path(arguments.out or f"results/{arguments.name}-{time.strftime('%Y%m%d-%H%M%S')}")
     summary = single_robot(

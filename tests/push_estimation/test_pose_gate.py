@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from push_ros.pose_tracker import PoseTracker, PoseTrackerSettings, Stamp
+from push_estimation.pose_gate import PoseGate, PoseGateSettings, Stamp
 
 
 def feed(tracker, stamp, pose):
@@ -15,7 +15,7 @@ def feed(tracker, stamp, pose):
 
 def test_stamp_policy():
     """FAULTS 10 and 12."""
-    t = PoseTracker()
+    t = PoseGate()
     assert t.begin(0.0) is Stamp.REFUSED and t.begin(math.nan) is Stamp.REFUSED
     assert t.begin(5.0) is Stamp.OK
     assert t.begin(5.0) is Stamp.REFUSED and t.begin(4.99) is Stamp.REFUSED
@@ -27,7 +27,7 @@ def test_stamp_policy():
 
 
 def test_nan_is_refused_and_changes_nothing():
-    t = PoseTracker()
+    t = PoseGate()
     assert feed(t, 1.0, [1, 2, 3])
     assert feed(t, 1.01, [math.nan, 2, 3]) is False
     assert t.refused == 1 and t.pose("a") == pytest.approx([1, 2, 3])
@@ -35,7 +35,7 @@ def test_nan_is_refused_and_changes_nothing():
 
 
 def test_pose_goes_stale():
-    t = PoseTracker()
+    t = PoseGate()
     feed(t, 1.0, [0, 0, 0])
     t.begin(1.1)
     assert t.pose("a") is not None
@@ -45,7 +45,7 @@ def test_pose_goes_stale():
 
 def test_jump_is_gated_until_it_persists():
     """FAULTS 9: never chased, accepted only after it persists."""
-    t = PoseTracker(PoseTrackerSettings(persistence=10))
+    t = PoseGate(PoseGateSettings(persistence=10))
     feed(t, 1.0, [0, 0, 0])
     accepted = [feed(t, 1.0 + 0.01 * k, [1.0, 0, 0]) for k in range(1, 11)]
     assert accepted == [False] * 9 + [True]
@@ -53,7 +53,7 @@ def test_jump_is_gated_until_it_persists():
 
 
 def test_single_outliers_never_get_in():
-    t = PoseTracker()
+    t = PoseGate()
     random = np.random.default_rng(0)
     for k in range(500):
         outlier = k % 3 == 1
@@ -66,7 +66,7 @@ def test_single_outliers_never_get_in():
 
 
 def test_ordinary_motion_with_noise_is_never_gated():
-    t = PoseTracker()
+    t = PoseGate()
     random = np.random.default_rng(0)
     for k in range(1000):
         x = 0.13 * 0.01 * k

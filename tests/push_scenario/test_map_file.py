@@ -7,7 +7,7 @@ from PIL import Image
 
 from push_model import SettingsError
 from push_model.occupancy import rasterise
-from push_ros.scenario import load_scenario, scenario_from_mapping
+from push_scenario.scenario import load_scenario, scenario_from_mapping
 
 FREE, GREY, WALL = 254, 205, 0
 

@@ -15,11 +15,11 @@ from matplotlib.animation import FuncAnimation, PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
 
-from push_bringup.bag import read_bag, read_metadata
 from push_model import se2
 from push_model.arrays import Array
-from push_ros.scenario import Scenario, scenario_from_mapping
+from push_record.bag import read_bag, read_metadata
 from push_ros.validation import planar_pose
+from push_scenario.scenario import Scenario, scenario_from_mapping
 
 _ROBOT, _OBJECT, _PLAN, _GOAL, _INK = "#2a62c9", "#d0751c", "#777777", "#c22f3d", "#222222"
 

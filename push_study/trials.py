@@ -165,7 +165,7 @@ def _end(process: BaseProcess) -> None:
 def _isolated(trial: Trial, task: Any) -> Row:
     """The trial in a process of its own, from a Dask worker, which must not have children."""
     done = subprocess.run(
-        [sys.executable, "-m", "push_bringup.trials"],
+        [sys.executable, "-m", "push_study.trials"],
         input=pickle.dumps((trial, task)),
         stdout=subprocess.PIPE,
         check=False,
