@@ -59,7 +59,8 @@ def _node(arguments: argparse.Namespace) -> int:
             live = {"tracker__deadline": _LIVE_DEADLINE}
             given = scenario.parameters.get("controller", {}).get("tracker", {})
             return ControllerNode(
-                scenario if "deadline" in given else scenario.settings("controller", **live)
+                scenario if "deadline" in given else scenario.settings("controller", **live),
+                scenario.robot()[0],
             )
         if arguments.name == "supervisor":
             from push_supervisor.node import SupervisorNode

@@ -1,10 +1,12 @@
 """From a stream of tracked poses to poses that may be acted on. No ROS here.
 
-Policy on stamps: zero is refused; one that is not newer than the last is refused, unless it lies
-back by more than ``reset_gap``, which counts as a reset of the clock; a gap forward beyond
-``timeout`` counts as an interruption of the stream.
+Policy on stamps: zero is refused, and so is one that is not newer than the last. A gap forward
+beyond ``timeout`` counts as an interruption of the stream. One that lies back by more than
+``reset_gap``, or ahead by more than ``leap``, is refused too, until the stream persists there: then
+it counts as a reset of the clock, or as an interruption.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from enum import Enum
 
@@ -28,6 +30,10 @@ class PoseGateSettings:
         10, low=1, high=1000, doc="frames a jumped pose must persist before it is believed"
     )
     reset_gap: float = bounded(0.5, low=0.01, high=60.0, doc="[s] back in time that means a reset")
+    leap: float = bounded(10.0, low=0.1, high=3600.0, doc="[s] ahead that a stamp is not believed")
+    stamp_persistence: int = bounded(
+        3, low=1, high=1000, doc="frames in a row that make a reset, or a leap, believed"
+    )
 
 
 class Stamp(Enum):
@@ -50,40 +56,65 @@ class _Body:
 class PoseGate:
     """Gates the poses of named bodies.
 
-    Counters: refused (non-finite pose or bad stamp), jumps (gated poses).
+    bodies: whose poses are kept; all, when None. Counters: refused (non-finite pose or bad stamp),
+    jumps (gated poses). refusal: why the last stamp was refused.
     """
 
-    def __init__(self, settings: PoseGateSettings | None = None) -> None:
+    def __init__(
+        self, settings: PoseGateSettings | None = None, bodies: Collection[str] | None = None
+    ) -> None:
         self.settings = settings or PoseGateSettings()
+        self.bodies = None if bodies is None else frozenset(bodies)
         self.refused = 0
         self.jumps = 0
+        self.refusal = ""
         self.reset()
 
     def reset(self) -> None:
         """Forget all bodies and the clock."""
         self.stamp = 0.0
+        self._elsewhere = 0.0  # newest stamp of a stream that may have moved there
+        self._frames_elsewhere = 0
         self._bodies: dict[str, _Body] = {}
 
     def begin(self, stamp: float) -> Stamp:
         """Judge the stamp [s] of a frame; ``accept`` is for the poses of accepted frames only."""
+        s = self.settings
         if not np.isfinite(stamp) or stamp <= 0.0:
-            self.refused += 1
-            return Stamp.REFUSED
+            return self._refuse(f"its stamp is {stamp:g}")
+        ahead = stamp - self.stamp
         verdict = Stamp.OK
         if self.stamp > 0.0:
-            if stamp < self.stamp - self.settings.reset_gap:
-                self.reset()
-                verdict = Stamp.RESET
-            elif stamp <= self.stamp:
-                self.refused += 1
-                return Stamp.REFUSED
-            elif stamp > self.stamp + self.settings.timeout:
+            if ahead < -s.reset_gap or ahead > s.leap:
+                if not self._persists(stamp):
+                    return self._refuse(f"its stamp lies {ahead:+.2f} s from the last one")
+                verdict = Stamp.RESET if ahead < 0.0 else Stamp.RESUMED
+            elif ahead <= 0.0:
+                return self._refuse("its stamp is not newer than the last")
+            elif ahead > s.timeout:
                 verdict = Stamp.RESUMED
+        if verdict is Stamp.RESET:
+            self.reset()
         self.stamp = stamp
+        self._frames_elsewhere = 0
         return verdict
 
+    def _persists(self, stamp: float) -> bool:
+        """Whether the stream has gone on from a far-off stamp for long enough."""
+        follows = 0.0 < stamp - self._elsewhere <= self.settings.timeout
+        self._frames_elsewhere = self._frames_elsewhere + 1 if follows else 1
+        self._elsewhere = stamp
+        return self._frames_elsewhere >= self.settings.stamp_persistence
+
+    def _refuse(self, why: str) -> Stamp:
+        self.refused += 1
+        self.refusal = why
+        return Stamp.REFUSED
+
     def accept(self, name: str, pose: Array) -> bool:
-        """Offer a pose ``(3,)`` of this frame; False when it is refused or gated."""
+        """Offer a pose ``(3,)`` of this frame; False when it is refused, gated or not wanted."""
+        if self.bodies is not None and name not in self.bodies:
+            return False
         if not np.isfinite(pose).all():
             self.refused += 1
             return False

@@ -130,17 +130,22 @@ class TrajectoryTracker:
         self._task = None
         self.v = self.omega = 0.0
 
-    def tick(self, dt: float, robot: Array, item: Array | None) -> Tick:
+    def tick(
+        self, dt: float, robot: Array, item: Array | None, others: Array = _NO_CIRCLES
+    ) -> Tick:
         """One control tick.
 
         Parameters
         ----------
         dt: [s] since the previous tick.
         robot, item: measured poses ``(3,)``; item only matters in a push.
+        others: ``(n, 3)`` moving obstacles where they are now, beside the task's circles.
         """
         task = self._task
         if task is None:
             raise RuntimeError("tick without a task")
+        if len(others):
+            task = replace(task, circles=np.vstack([task.circles, others]))
         robot = self._without_delay(robot, dt)
         shift = self._shift(task, dt, robot, item)
         reference = self._advance(task, dt, shift)

@@ -49,7 +49,7 @@ class BagWriter:
         self.closed = False
 
     def add_topic(self, topic: str, message_type: str, latched: bool) -> None:
-        """Register a topic, e.g. type ``push_msgs/msg/NamedPoses``."""
+        """Register a topic, e.g. type ``push_msgs/msg/Poses``."""
         definition, _ = self._store.generate_msgdef(message_type, ros_version=2)
         schema = self._writer.register_schema(message_type, "ros2msg", definition.encode())
         qos = yaml.safe_dump([_qos(latched)])

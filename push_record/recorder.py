@@ -11,10 +11,10 @@ from nav_msgs.msg import OccupancyGrid
 from nav_msgs.msg import Path as PathMessage
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
-from std_msgs.msg import Header, String
+from std_msgs.msg import Bool, Header, String
 from visualization_msgs.msg import MarkerArray
 
-from push_msgs.msg import Contacts, ControllerStatus, NamedPoses, PushPlan, SupervisorState
+from push_msgs.msg import Contacts, ControllerStatus, JobState, Poses, PushPlan
 from push_record.bag import BagWriter
 from push_ros.conversions import time_from_ros
 from push_ros.qos import CLOCK, COMMAND, LATCHED, STATUS, STREAM
@@ -42,16 +42,16 @@ def topics(scenario: Scenario) -> dict[str, tuple[Any, Any]]:
     """What is recorded: topic to message class and QoS."""
     result: dict[str, tuple[Any, Any]] = {
         "/clock": (Clock, CLOCK),
-        "/poses": (NamedPoses, STREAM),
-        "/ground_truth/poses": (NamedPoses, STREAM),
+        "/poses": (Poses, STREAM),
+        "/ground_truth/poses": (Poses, STREAM),
         "/contacts": (Contacts, STREAM),
         "/map": (OccupancyGrid, LATCHED),
         "/goal_pose": (PoseStamped, COMMAND),
         "/push_plan": (PushPlan, LATCHED),
         "/push_path": (PathMessage, LATCHED),
-        "/supervisor/state": (SupervisorState, LATCHED),
-        "/supervisor/status_text": (String, LATCHED),
-        "/controller/status": (ControllerStatus, STATUS),
+        "/job_state": (JobState, LATCHED),
+        "/status_text": (String, LATCHED),
+        "/paused": (Bool, LATCHED),
         "/tf": (TFMessage, STATUS),
         "/visualization": (MarkerArray, STATUS),
         "/diagnostics": (DiagnosticArray, STATUS),
@@ -59,6 +59,7 @@ def topics(scenario: Scenario) -> dict[str, tuple[Any, Any]]:
     for robot in scenario.robots:
         result[f"/{robot}/cmd_vel"] = (TwistStamped, COMMAND)
         result[f"/{robot}/heartbeat"] = (Header, STREAM)
+        result[f"/{robot}/controller/status"] = (ControllerStatus, STATUS)
     return result
 
 

@@ -54,6 +54,13 @@ class Scenario:
         """Occupancy grid of the environment."""
         return rasterise(self.environment)
 
+    @property
+    def radii(self) -> dict[str, float]:
+        """[m] of the circle about a robot's axle midpoint, or an object's centre, that holds it."""
+        robots = {name: spec.footprint_radius for name, (spec, _) in self.robots.items()}
+        items = {name: spec.geometry.circumradius for name, (spec, _) in self.objects.items()}
+        return robots | items
+
     def robot(self, name: str = "") -> tuple[str, RobotSpec]:
         """Name and type of a robot; of the first when no name is given."""
         return _pick(name, {k: v[0] for k, v in self.robots.items()}, "robot")

@@ -11,7 +11,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from push_model.arrays import Array
 from push_mpc.node import ControllerNode
-from push_msgs.msg import SupervisorState
+from push_msgs.msg import JobState
 from push_planner.node import PlannerNode
 from push_ros.process import Spinner, claim_domain, prepare_environment
 from push_scenario.scenario import Scenario
@@ -56,13 +56,15 @@ class LockstepRun:
         try:
             self.bridge = BridgeNode(simulated, autostart=False)
             nodes.append(self.bridge)
-            self.controller = ControllerNode(self.scenario)
+            self.controller = ControllerNode(self.scenario, self.scenario.robot()[0])
             nodes.append(self.controller)
             self.planner = PlannerNode(self.scenario)
             nodes.append(self.planner)
             self.supervisor = SupervisorNode(self.scenario)
             nodes.append(self.supervisor)
-            self.observer = Observer(self.supervisor.robot, self.supervisor.object)
+            self.observer = Observer(
+                self.supervisor.names, self.supervisor.robot, self.supervisor.object
+            )
             nodes.append(self.observer)
             nodes.extend(extra() if extra else [])
         except BaseException:
@@ -91,17 +93,14 @@ class LockstepRun:
     def connect(self, limit: float = 20.0) -> None:
         """Wait until all parts know each other; nothing moves before."""
         assert self.spinner is not None
-        robot = self.supervisor.robot
 
         def connected() -> bool:
             return (
                 self.supervisor.ready
                 and self.planner.ready
-                and self.bridge.count_publishers(f"/{robot}/cmd_vel") > 0
-                and self.bridge.count_subscribers("/poses") >= 2
-                and self.observer.count_publishers("/ground_truth/poses") > 0
+                and len(self.bridge.commanded()) == 1
+                and self.bridge.heard_by(2)
                 and self.observer.connected
-                and self.observer.state is not None
             )
 
         if not self.spinner.until(connected, limit):
@@ -124,19 +123,17 @@ class LockstepRun:
         self.spinner.until(lambda: condition() or self.bridge.time > end, wall_limit)
         return condition()
 
-    def reach(self, goal: Array, sim_limit: float = 300.0) -> SupervisorState | None:
+    def reach(self, goal: Array, sim_limit: float = 300.0) -> JobState | None:
         """Send a goal and wait until its job ends; the state then, or None after sim_limit [s]."""
-        seen = len(self.observer.trace.states)
-        began = False
+        before = self.observer.state
+        assert before is not None, "the run has not been started"
+        jobs, refusals = int(before.job), int(before.refusals)
         self.observer.send_goal(goal)
 
         def ended() -> bool:
-            nonlocal began
             state = self.observer.state
-            if state is None:
-                return False
-            if len(self.observer.trace.states) > seen:
-                began = True
-            return began and state.state == SupervisorState.IDLE and not state.plan_ready
+            assert state is not None
+            begun = state.job > jobs and state.state == JobState.IDLE and not state.plan_ready
+            return begun or state.refusals > refusals
 
         return self.observer.state if self.spin_until(ended, sim_limit) else None

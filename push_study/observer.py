@@ -8,11 +8,11 @@ from rclpy.node import Node
 
 from push_model import se2
 from push_model.arrays import Array
-from push_msgs.msg import Contacts, ControllerStatus, NamedPoses, PushPlan, SupervisorState
-from push_ros.conversions import pose_stamped_to_ros, time_from_ros
-from push_ros.process import reaches
+from push_msgs.msg import Contacts, ControllerStatus, JobState, Poses, PushPlan
+from push_ros.conversions import pose_stamped_to_ros, poses_from_ros, time_from_ros
+from push_ros.names import Names
+from push_ros.process import heard
 from push_ros.qos import COMMAND, LATCHED, STATUS, STREAM
-from push_ros.validation import planar_pose
 
 
 @dataclass
@@ -33,20 +33,22 @@ class Trace:
 class Observer(Node):
     """Watches a run from ground truth. For evaluation only: it commands nothing but the goal."""
 
-    def __init__(self, robot: str, item: str) -> None:
-        super().__init__("observer")
+    def __init__(self, names: Names, robot: str, item: str) -> None:
+        super().__init__("observer", namespace=names.team_space)
         self._robot, self._item = robot, item
         self.trace = Trace()
-        self.state: SupervisorState | None = None
+        self.state: JobState | None = None
         self._touching = False
         self._apart = 0
         self._poses: dict[str, Array] = {}
-        self.create_subscription(NamedPoses, "/ground_truth/poses", self._on_truth, STREAM)
-        self.create_subscription(Contacts, "/contacts", self._on_contacts, STREAM)
-        self.create_subscription(SupervisorState, "/supervisor/state", self._on_state, LATCHED)
-        self.create_subscription(PushPlan, "/push_plan", self._on_plan, LATCHED)
-        self.create_subscription(ControllerStatus, "/controller/status", self._on_status, STATUS)
-        self._goal_publisher = self.create_publisher(PoseStamped, "/goal_pose", COMMAND)
+        self._truth_topic = names.world("ground_truth/poses")
+        status = names.robot(robot, "controller/status")
+        self.create_subscription(Poses, self._truth_topic, self._on_truth, STREAM)
+        self.create_subscription(Contacts, names.world("contacts"), self._on_contacts, STREAM)
+        self.create_subscription(JobState, names.team("job_state"), self._on_state, LATCHED)
+        self.create_subscription(PushPlan, names.team("push_plan"), self._on_plan, LATCHED)
+        self.create_subscription(ControllerStatus, status, self._on_status, STATUS)
+        self._goal_publisher = self.create_publisher(PoseStamped, names.team("goal_pose"), COMMAND)
 
     def look_away(self) -> None:
         """Stop observing, e.g. to measure a run without it."""
@@ -55,33 +57,35 @@ class Observer(Node):
 
     @property
     def connected(self) -> bool:
-        """Whether a goal would be received."""
-        return reaches(self, self._goal_publisher, "supervisor")
+        """Whether it hears the world and the owner of the goals, who would hear a goal."""
+        return (
+            self.state is not None
+            and self.count_publishers(self._truth_topic) > 0
+            and heard(self, self._goal_publisher)
+        )
 
     def send_goal(self, goal: Array) -> None:
         """Publish a goal ``(3,)`` on /goal_pose."""
         self._goal_publisher.publish(pose_stamped_to_ros(goal, 0.0))
 
-    def _on_truth(self, message: NamedPoses) -> None:
+    def _on_truth(self, message: Poses) -> None:
         t = self.trace
         t.time.append(time_from_ros(message.header.stamp))
-        for named in message.poses:
-            pose = planar_pose(named.pose, named.name)
-            if named.name == self._robot:
-                t.robot.append(pose)
-            elif named.name == self._item:
-                t.object.append(pose)
+        poses, _ = poses_from_ros(message, (self._robot, self._item))
+        if self._robot in poses:
+            t.robot.append(poses[self._robot])
+        if self._item in poses:
+            t.object.append(poses[self._item])
 
     def _on_contacts(self, message: Contacts) -> None:
         pair = {self._robot, self._item}
         touching = False
-        for contact in message.contacts:
-            bodies = {contact.body_a, contact.body_b}
+        for bodies in map(set, zip(message.body_a, message.body_b, strict=True)):
             if bodies == pair:
                 touching = True
             elif bodies & pair:
                 self.trace.collisions += 1
-        pushing = self.state is not None and self.state.state == SupervisorState.PUSHING
+        pushing = self.state is not None and self.state.state == JobState.PUSHING
         if not pushing:
             self._touching, self._apart = False, 0
         elif touching:
@@ -92,11 +96,11 @@ class Observer(Node):
                 self.trace.contact_losses += 1
                 self._touching = False
 
-    def _on_state(self, message: SupervisorState) -> None:
-        if message.state == SupervisorState.PUSHING and (
+    def _on_state(self, message: JobState) -> None:
+        if message.state == JobState.PUSHING and (
             self.state is None
-            or self.state.state != SupervisorState.PUSHING
-            or self.state.push_index != message.push_index
+            or self.state.state != JobState.PUSHING
+            or self.state.step_index != message.step_index
         ):
             self.trace.pushes += 1
         self.state = message

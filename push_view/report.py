@@ -72,21 +72,21 @@ def load(bag: Path) -> BagContents:
     status: list[list[float]] = []
     wanted = {
         "/ground_truth/poses",
-        "/controller/status",
-        "/supervisor/state",
+        "/job_state",
         "/push_plan",
         "/contacts",
     }
-    for record in read_bag(bag, wanted):
+    status_topics = {f"/{robot}/controller/status" for robot in scenario.robots}
+    for record in read_bag(bag, wanted | status_topics):
         m = record.message
         if record.topic == "/ground_truth/poses":
             times.append(_seconds(m.header.stamp))
-            for named in m.poses:
-                poses.setdefault(named.name, []).append(planar_pose(named.pose))
-        elif record.topic == "/controller/status":
+            for name, *pose in zip(m.names, m.x, m.y, m.theta, strict=True):
+                poses.setdefault(name, []).append(np.array(pose))
+        elif record.topic in status_topics:
             if m.mode in (1, 2):
                 status.append([_seconds(m.header.stamp)] + [getattr(m, k) for k in STATUS[1:]])
-        elif record.topic == "/supervisor/state":
+        elif record.topic == "/job_state":
             contents.states.append((_seconds(m.header.stamp), m.state_name, m.reason))
             if m.goal.header.frame_id:
                 contents.goal = planar_pose(m.goal.pose)
@@ -95,8 +95,8 @@ def load(bag: Path) -> BagContents:
         else:
             contents.collisions += sum(
                 1
-                for c in m.contacts
-                if ({c.body_a, c.body_b} & bodies) and not {c.body_a, c.body_b} <= bodies
+                for pair in map(set, zip(m.body_a, m.body_b, strict=True))
+                if pair & bodies and not pair <= bodies
             )
     count = min([len(times), *(len(p) for p in poses.values())]) if poses else 0
     contents.time = np.array(times[:count])

@@ -27,8 +27,14 @@ from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from push_model.occupancy import OccupancyGrid
-from push_msgs.msg import ControllerStatus, NamedPoses, SupervisorState
-from push_ros.conversions import grid_from_ros, pose_stamped_to_ros, time_from_ros
+from push_msgs.msg import ControllerStatus, JobState, Poses
+from push_ros.conversions import (
+    grid_from_ros,
+    pose_stamped_to_ros,
+    poses_from_ros,
+    time_from_ros,
+)
+from push_ros.names import names_of
 from push_ros.qos import COMMAND, LATCHED, STATUS, STREAM
 from push_ros.validation import InvalidMessage, planar_pose
 from push_scenario.scenario import Scenario
@@ -44,6 +50,7 @@ class ViewerNode(Node):
 
     def __init__(self, scenario: Scenario) -> None:
         super().__init__("viewer")
+        names = names_of(self)
         self._lock = threading.Lock()
         self._requests: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
         self._outlines = {
@@ -53,22 +60,23 @@ class ViewerNode(Node):
         self._item = next(iter(scenario.objects), "")
         self._grid: OccupancyGrid | None = None
         self._view: dict[str, Any] = {"poses": {}, "path": [], "log": [], "map": 0}
-        self._goal_publisher = self.create_publisher(PoseStamped, "/goal_pose", COMMAND)
-        self._cancel_client = self.create_client(Trigger, "/supervisor/cancel")
-        self.create_subscription(NamedPoses, "/poses", self._on_poses, STREAM)
-        self.create_subscription(GridMessage, "/map", self._on_map, LATCHED)
-        self.create_subscription(PathMessage, "/push_path", self._on_path, LATCHED)
-        self.create_subscription(SupervisorState, "/supervisor/state", self._on_state, LATCHED)
-        self.create_subscription(ControllerStatus, "/controller/status", self._on_status, STATUS)
+        self._goal_publisher = self.create_publisher(PoseStamped, names.team("goal_pose"), COMMAND)
+        self._cancel_client = self.create_client(Trigger, names.team("cancel"))
+        self.create_subscription(Poses, names.world("poses"), self._on_poses, STREAM)
+        self.create_subscription(GridMessage, names.world("map"), self._on_map, LATCHED)
+        self.create_subscription(PathMessage, names.team("push_path"), self._on_path, LATCHED)
+        self.create_subscription(JobState, names.team("job_state"), self._on_state, LATCHED)
+        for robot in scenario.robots:
+            topic = names.robot(robot, "controller/status")
+            self.create_subscription(ControllerStatus, topic, self._on_status, STATUS)
         self.create_timer(_PERIOD, self._work)
 
-    def _on_poses(self, message: NamedPoses) -> None:
-        poses = {}
-        for named in message.poses:
-            try:
-                poses[named.name] = planar_pose(named.pose, named.name).tolist()
-            except InvalidMessage:
-                continue
+    def _on_poses(self, message: Poses) -> None:
+        try:
+            known, _ = poses_from_ros(message, self._outlines)
+        except InvalidMessage:
+            return
+        poses = {name: pose.tolist() for name, pose in known.items()}
         with self._lock:
             self._view["poses"].update(poses)
             self._view["time"] = time_from_ros(message.header.stamp)
@@ -89,7 +97,7 @@ class ViewerNode(Node):
         with self._lock:
             self._view["path"] = points if np.isfinite(points).all() else []
 
-    def _on_state(self, message: SupervisorState) -> None:
+    def _on_state(self, message: JobState) -> None:
         goal = None
         if message.goal.header.frame_id:
             with contextlib.suppress(InvalidMessage):
@@ -100,7 +108,7 @@ class ViewerNode(Node):
             self._view["state"] = message.state_name
             self._view["reason"] = message.reason
             self._view["error_code"] = int(message.error_code)
-            self._view["push"] = [int(message.push_index) + 1, int(message.push_count)]
+            self._view["push"] = [int(message.step_index) + 1, int(message.step_count)]
             log = self._view["log"]
             log.append([stamp, message.state_name, message.reason])
             del log[:-_LOG]

@@ -22,8 +22,53 @@ def test_stamp_policy():
     assert t.begin(5.01) is Stamp.OK
     assert t.begin(6.0) is Stamp.RESUMED
     t.accept("a", np.zeros(3))
-    assert t.begin(1.0) is Stamp.RESET and t.pose("a") is None
-    assert t.begin(1.01) is Stamp.OK
+    assert [t.begin(1.0 + 0.01 * k) for k in range(2)] == [Stamp.REFUSED] * 2
+    assert t.begin(1.02) is Stamp.RESET and t.pose("a") is None
+    assert t.begin(1.03) is Stamp.OK
+
+
+@pytest.mark.parametrize("wild", [0.5, 1e9, 4e3, 3.0])
+def test_one_wild_stamp_is_refused_and_no_reset(wild):
+    """FAULTS 25: now and then, for as long as one likes."""
+    t = PoseGate()
+    for k in range(1, 400):
+        assert feed(t, 100.0 + 0.01 * k, [0.001 * k, 0, 0]), k
+        if k % 5 < 2:
+            assert t.begin(wild) is Stamp.REFUSED
+            assert t.pose("a")[0] == 0.001 * k
+    assert t.begin(100.0 + 0.01 * 400) is Stamp.OK
+
+
+def test_random_wild_stamps_never_reset_nor_move_the_clock():
+    random = np.random.default_rng(1)
+    t = PoseGate()
+    assert t.begin(50.0) is Stamp.OK
+    now = 50.0
+    for _ in range(3000):
+        if random.random() < 0.3:
+            wild = float(random.choice([random.uniform(-10, 49.4), random.uniform(80, 1e6), 1e-9]))
+            verdict = t.begin(wild)
+            assert verdict is Stamp.REFUSED, wild
+        else:
+            now += 0.01
+            assert t.begin(now) in (Stamp.OK, Stamp.RESUMED)
+            assert t.stamp == now
+
+
+def test_a_stream_that_stays_ahead_is_believed():
+    t = PoseGate()
+    assert t.begin(1.0) is Stamp.OK
+    verdicts = [t.begin(500.0 + 0.01 * k) for k in range(4)]
+    assert verdicts == [Stamp.REFUSED] * 2 + [Stamp.RESUMED, Stamp.OK]
+
+
+def test_only_wanted_bodies_are_kept():
+    t = PoseGate(bodies=["a"])
+    for k in range(1000):
+        t.begin(1.0 + 0.01 * k)
+        assert not t.accept(f"stranger{k}", np.zeros(3))
+        assert t.accept("a", np.zeros(3))
+    assert set(t._bodies) == {"a"}
 
 
 def test_nan_is_refused_and_changes_nothing():

@@ -5,27 +5,25 @@ import signal
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 from mcap.reader import make_reader
 from rclpy.serialization import serialize_message
 from rosbags.highlevel import AnyReader
 
-from push_msgs.msg import NamedPose, NamedPoses
 from push_record.bag import BagWriter, bag_file, read_bag, read_metadata, recover
+from push_ros.conversions import poses_to_ros
 
 META = {"scenario": "a: 1", "seed": "7"}
 
 
 def message(k):
-    m = NamedPoses(poses=[NamedPose(name="box")])
-    m.header.stamp.sec = k
-    m.poses[0].pose.position.x = 0.5 * k
-    return bytes(serialize_message(m))
+    return bytes(serialize_message(poses_to_ros({"box": np.array([0.5 * k, 0.0, 0.0])}, k)))
 
 
 def write(folder, count):
     writer = BagWriter(folder, META)
-    writer.add_topic("/poses", "push_msgs/msg/NamedPoses", False)
+    writer.add_topic("/poses", "push_msgs/msg/Poses", False)
     writer.add_topic("/text", "std_msgs/msg/String", True)
     for k in range(count):
         writer.write("/poses", k * 10**7, message(k))
@@ -36,10 +34,9 @@ def test_bag_opens_in_rosbags_and_mcap(tmp_path):
     write(tmp_path / "bag", 100).close()
     with AnyReader([tmp_path / "bag"]) as reader:
         (connection,) = [c for c in reader.connections if c.topic == "/poses"]
-        assert connection.msgtype == "push_msgs/msg/NamedPoses" and connection.msgcount == 100
+        assert connection.msgtype == "push_msgs/msg/Poses" and connection.msgcount == 100
         values = [
-            reader.deserialize(d, c.msgtype).poses[0].pose.position.x
-            for c, _, d in reader.messages([connection])
+            reader.deserialize(d, c.msgtype).x[0] for c, _, d in reader.messages([connection])
         ]
         assert values == [0.5 * k for k in range(100)]
     with bag_file(tmp_path / "bag").open("rb") as file:

@@ -13,8 +13,8 @@ from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import OccupancyGrid
 from std_srvs.srv import Trigger
 
-from push_msgs.msg import NamedPose, NamedPoses, SupervisorState
-from push_ros.conversions import grid_to_ros, pose_to_ros, time_to_ros
+from push_msgs.msg import JobState, Poses
+from push_ros.conversions import grid_to_ros, poses_to_ros
 from push_ros.process import Spinner
 from push_ros.qos import COMMAND, LATCHED, STREAM
 from push_view.viewer import ViewerNode, ViewerServer
@@ -30,10 +30,10 @@ class Page:
         self.other = rclpy.create_node("other")
         self.goals, self.cancels = [], []
         self.other.create_subscription(PoseStamped, "/goal_pose", self.goals.append, COMMAND)
-        self.other.create_service(Trigger, "/supervisor/cancel", self.on_cancel)
-        self.poses = self.other.create_publisher(NamedPoses, "/poses", STREAM)
+        self.other.create_service(Trigger, "/cancel", self.on_cancel)
+        self.poses = self.other.create_publisher(Poses, "/poses", STREAM)
         self.maps = self.other.create_publisher(OccupancyGrid, "/map", LATCHED)
-        self.states = self.other.create_publisher(SupervisorState, "/supervisor/state", LATCHED)
+        self.states = self.other.create_publisher(JobState, "/job_state", LATCHED)
         self.spinner = Spinner([self.node, self.other])
         assert self.spinner.until(
             lambda: (
@@ -99,15 +99,10 @@ def test_page_bodies_and_map(page):
 
 
 def test_events_carry_poses_and_states_and_nothing_that_is_not_json(page):
-    frame = NamedPoses(
-        poses=[
-            NamedPose(name="box", pose=pose_to_ros(np.array([0.5, -0.2, 1.0]))),
-            NamedPose(name="epuck1", pose=pose_to_ros(np.array([0.4, math.nan, 1.0]))),
-        ]
-    )
-    frame.header.stamp = time_to_ros(3.5)
+    places = {"box": np.array([0.5, -0.2, 1.0]), "epuck1": np.array([0.4, math.nan, 1.0])}
+    frame = poses_to_ros(places, 3.5)
     page.poses.publish(frame)
-    page.states.publish(SupervisorState(state_name="PLANNING", reason="why <b>not</b>"))
+    page.states.publish(JobState(state_name="PLANNING", reason="why <b>not</b>"))
     assert page.spinner.until(lambda: b"PLANNING" in page.node.snapshot(), 5.0)
     assert page.spinner.until(lambda: b'"box"' in page.node.snapshot(), 5.0)
     view = page.view()

@@ -13,16 +13,10 @@ from mcap.reader import make_reader
 
 from push_bringup.launcher import Child, Launcher, single_robot
 from push_bringup.monitor import Monitor
-from push_msgs.msg import SupervisorState
+from push_msgs.msg import JobState
 from push_record.bag import bag_file, read_bag
-from push_ros.process import claim_domain
 
 FACTOR = ["--ros", "-p", "real_time_factor:=3.0"]
-
-
-@pytest.fixture
-def domain():
-    claim_domain()
 
 
 def alive(group):
@@ -39,8 +33,8 @@ def standstill(bag, sign, limit):
         if record.topic == sign:
             last = max(last, stamp)
         else:
-            (pose,) = [p.pose for p in record.message.poses if p.name == "epuck1"]
-            truth.append((stamp, pose.position.x, pose.position.y))
+            place = list(record.message.names).index("epuck1")
+            truth.append((stamp, record.message.x[place], record.message.y[place]))
     table = np.array(truth)
     moving = table[(table[:, 0] > last - 0.5) & (table[:, 0] <= last)]
     assert np.hypot(*(moving[-1] - moving[0])[1:]) > 0.01, "it was to be killed on the move"
@@ -88,7 +82,7 @@ def test_killed_node(domain, victim, respawn, tmp_path):
         covered, way = standstill(tmp_path / "bag", sign, limit)
         assert covered > 1.5 and way < 1e-3  # it rocks by 0.2 mm
     topics = {r.topic for r in read_bag(tmp_path / "bag")}
-    assert {"/poses", "/epuck1/cmd_vel", "/supervisor/state"} <= topics
+    assert {"/poses", "/epuck1/cmd_vel", "/job_state"} <= topics
 
 
 def test_a_planner_killed_at_work_is_asked_again(domain):
@@ -102,7 +96,7 @@ def test_a_planner_killed_at_work_is_asked_again(domain):
             (child,) = [c for c in launcher.children if c.name == "planner"]
             child.process.send_signal(signal.SIGSTOP)  # it takes the request but never answers
             monitor.send_goal((0.1, 0.04, 0.1))
-            assert monitor.wait(10.0, lambda: monitor.state.state == SupervisorState.PLANNING)
+            assert monitor.wait(10.0, lambda: monitor.state.state == JobState.PLANNING)
             monitor.wait(0.5, lambda: False)
             child.process.send_signal(signal.SIGKILL)
             assert monitor.follow(90.0, lambda: launcher.check() is not None) == 0, monitor.state
