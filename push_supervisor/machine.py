@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any
 
-from push_model.settings import bounded
+from push_model.settings import bounded, settings
 
 
 class State(IntEnum):
@@ -44,7 +44,7 @@ class JobError(IntEnum):
     NODE_LOST = 314
 
 
-@dataclass(frozen=True)
+@settings
 class SupervisorSettings:
     """Tolerances, patience and speeds of a job."""
 
