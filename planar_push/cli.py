@@ -26,7 +26,7 @@ def _warm_up(arguments: argparse.Namespace) -> int:
     scenario = load_scenario("env1-target1")
     _, robot = scenario.robot()
     _, item = scenario.object()
-    TrajectoryTracker(TrackerSettings(), LtvMpc(MpcSettings(), robot.drive)).warm_up()
+    TrajectoryTracker(TrackerSettings(), LtvMpc(MpcSettings(), robot.differential)).warm_up()
     start = next(iter(scenario.objects.values()))[1]
     goal = scenario.goal if scenario.goal is not None else np.zeros(3)
     PushPlanner(PlannerSettings(), scenario.grid, robot, item).solve(start, goal)

@@ -14,10 +14,10 @@ import numpy as np
 
 from push_model import se2
 from push_model.arrays import Array
-from push_model.settings import bounded
+from push_model.settings import bounded, settings
 
 
-@dataclass(frozen=True)
+@settings
 class PoseGateSettings:
     """When a pose is too old or too far."""
 

@@ -64,7 +64,7 @@ class ControllerNode(Node):
             raise SettingsError(
                 f"controller: unknown key '{next(iter(values))}'; expected mpc, tracker or poses"
             )
-        self._drive = spec.drive
+        self._drive = spec.differential
         self._mpc_settings = declare_settings(
             self, MpcSettings, sections["mpc"], "mpc", "controller.mpc", self._apply_mpc
         )

@@ -4,7 +4,6 @@ import base64
 import math
 from binascii import Error as Base64Error
 from collections.abc import Mapping
-from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import Any, Literal
@@ -14,14 +13,14 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from push_model.occupancy import MapSpec, OccupancyGrid
-from push_model.settings import SettingsError, bounded, from_mapping
+from push_model.settings import SettingsError, bounded, from_mapping, settings
 
 _DATA = "data:image/png;base64,"
 _MODES = ("1", "L", "LA", "P", "RGB", "RGBA")  # of 8 bits a channel
 _MAX_CELLS = 4_000_000
 
 
-@dataclass(frozen=True)
+@settings
 class MapFile:
     """The keys of map_server, and what the walls are in simulation."""
 

@@ -11,7 +11,7 @@ from enum import IntEnum
 from typing import Any
 
 from push_model.jobs import JobError
-from push_model.settings import bounded
+from push_model.settings import bounded, settings
 
 
 class State(IntEnum):
@@ -25,7 +25,7 @@ class State(IntEnum):
     DETACHING = 6
 
 
-@dataclass(frozen=True)
+@settings
 class SupervisorSettings:
     """Tolerances, patience and speeds of a job."""
 

@@ -194,8 +194,8 @@ class BridgeNode(Node):
         if robot not in self._scenario.robots:
             return  # one that is gone with the last scenario
         v, omega = message.twist.linear.x, message.twist.angular.z
-        limit = 10.0 * self._scenario.robots[robot][0].drive.max_speed
-        turn_limit = 10.0 * self._scenario.robots[robot][0].drive.max_turn_rate
+        limit = 10.0 * self._scenario.robots[robot][0].max_speed
+        turn_limit = 10.0 * self._scenario.robots[robot][0].max_turn_rate
         topic = self._names.robot(robot, "cmd_vel")
         if not (math.isfinite(v) and math.isfinite(omega)):
             self._diagnostics.refuse(topic, f"not finite: v={v}, omega={omega}")

@@ -79,8 +79,10 @@ def draw_world(task: SingleRobotTask) -> tuple[Scenario, Scenario, Row]:
     robots = {}
     for name, (robot, start) in believed.robots.items():
         grip = float(random.uniform(1.0 - task.spread, 1.0 + task.spread))
-        robots[name] = (replace(robot, wheel_friction=robot.wheel_friction * grip), start)
-        drawn[f"{name}_wheel_friction"] = robots[name][0].wheel_friction
+        drive = robot.drive
+        drive = replace(drive, wheel_friction=drive.wheel_friction * grip)
+        robots[name] = (replace(robot, drive=drive), start)
+        drawn[f"{name}_wheel_friction"] = drive.wheel_friction
     return believed, replace(believed, objects=objects, robots=robots), drawn
 
 

@@ -1,16 +1,20 @@
 """FAULTS 20: files and parameters that are wrong are refused, and say what was expected."""
 
+from dataclasses import asdict
+
 import numpy as np
 import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from push_model import SettingsError
+from push_model import SettingsError, from_mapping
 from push_model.occupancy import rasterise
+from push_model.specs import ObjectSpec, RobotSpec
 from push_scenario.scenario import (
     config_directory,
     load_scenario,
+    read_yaml,
     scenario_from_mapping,
     scenario_names,
 )
@@ -30,6 +34,15 @@ def test_every_shipped_scenario_is_sound(name):
         assert grid.contains(start[0], start[1])
     again = scenario_from_mapping(yaml.safe_load(scenario.text), name, "again")
     assert again.text == scenario.text
+
+
+@pytest.mark.parametrize(("kind", "cls"), [("robots", RobotSpec), ("objects", ObjectSpec)])
+def test_every_shipped_type_is_sound(kind, cls):
+    files = sorted((config_directory() / kind).glob("*.yaml"))
+    made = [from_mapping(cls, read_yaml(path), path.name) for path in files]
+    assert len(made) >= 4
+    for spec in made:
+        assert from_mapping(cls, asdict(spec)) == spec
 
 
 @pytest.mark.parametrize(
