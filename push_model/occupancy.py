@@ -1,6 +1,7 @@
 """Occupancy grids of environments."""
 
 import math
+from array import array
 from dataclasses import dataclass
 from typing import Any
 
@@ -53,7 +54,7 @@ class OccupancyGrid:
 
         Runs of occupied cells along the rows; equal runs in rows one above the other are one.
         """
-        found: list[tuple[int, int, int, int]] = []
+        found = array("l")  # flat: maps can have a million rectangles
         open_runs: dict[tuple[int, int], int] = {}
         rows = self.occupied.shape[0]
         for row in range(rows + 1):
@@ -62,7 +63,8 @@ class OccupancyGrid:
                 steps = np.diff(self.occupied[row].astype(np.int8), prepend=0, append=0)
                 ends = np.flatnonzero(steps).reshape(-1, 2).tolist()
                 runs = {(a, b): open_runs.pop((a, b), row) for a, b in ends}
-            found.extend((a, b, first, row) for (a, b), first in open_runs.items())
+            for (a, b), first in open_runs.items():
+                found.extend((a, b, first, row))
             open_runs = runs
         corners = np.array(found, dtype=np.float64).reshape(-1, 4) * self.resolution
         return corners + self.origin[[0, 0, 1, 1]]

@@ -279,12 +279,16 @@ def guide_paths(
     top = cap if widest >= cap else _NARROWER * widest
     low = min(easy, top)
     count = settings.clearance_levels if top > 1.05 * low else 1
-    best = math.inf
+    found: list[GuidePath] = []
     for level in np.geomspace(top, low, count):
         path = _path_at(field, start, goal, float(level), settings, seed, ends)
-        if path is not None:
-            best = min(best, path.cost)
-            yield path
+        if path is None or (found and np.array_equal(path.points, found[-1].points)):
+            continue
+        found.append(path)
+        yield path
+        if len(path.points) == 2:  # straight on: no other level can be better
+            break
+    best = min((path.cost for path in found), default=math.inf)
     narrow = lattice_path(field, start, goal, least, ends) if least < low else None
     if narrow is not None and path_cost(field, narrow, settings, ends).cost < best:
         path = _path_at(field, start, goal, least, settings, seed, ends)

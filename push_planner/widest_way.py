@@ -36,29 +36,36 @@ def widest_clearance(
     heads = np.zeros(top + 1, dtype=np.int32)
     pool = new_pool()
     level = top
+    before = math.inf  # squared distance to the goal of the place taken last
     steps = STEPS
     fresh = corners(field, start[0], start[1])
     count = 4
     around = np.empty((8, 2), dtype=np.int64)
     while True:
-        for k in range(count):
-            i, j = fresh[k, 0], fresh[k, 1]
-            if i < 0 or j < 0 or i >= rows or j >= columns or seen[i, j]:
-                continue
-            seen[i, j] = 1
-            square = int(min(field[i, j], level))
-            if 0 < square < level:
-                slack = slack_at(ends, j, i)
-                if slack > 0.0 and math.sqrt(square) >= need - slack:
-                    square = level
-            if square > 0:
-                pool = push(heads, pool, square, i * columns + j)
+        # Of places with equal distance the last is taken first: those nearer to the goal.
+        for nearer in (False, True):
+            for k in range(count):
+                i, j = fresh[k, 0], fresh[k, 1]
+                if i < 0 or j < 0 or i >= rows or j >= columns or seen[i, j]:
+                    continue
+                gap = (i - goal[1]) ** 2 + (j - goal[0]) ** 2
+                if not nearer and gap < before:
+                    continue
+                seen[i, j] = 1
+                square = int(min(field[i, j], level))
+                if 0 < square < level:
+                    slack = slack_at(ends, j, i)
+                    if slack > 0.0 and math.sqrt(square) >= need - slack:
+                        square = level
+                if square > 0:
+                    pool = push(heads, pool, square, i * columns + j)
         while level > 0 and heads[level] == 0:
             level -= 1
         if level == 0:
             return 0.0
         index = pop(heads, pool, level)
         i, j = index // columns, index % columns
+        before = (i - goal[1]) ** 2 + (j - goal[0]) ** 2
         for k in range(4):
             if i == targets[k, 0] and j == targets[k, 1]:
                 return min(cap, math.sqrt(level))

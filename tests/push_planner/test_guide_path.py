@@ -37,12 +37,12 @@ def along(points, spacing=0.002):
     return np.vstack(pieces)
 
 
-def wall_with_gap(x, thick, middle, width):
-    """A wall across the arena, open at ``middle`` by ``width``."""
-    low, high = middle - width / 2.0, middle + width / 2.0
-    return (
-        BoxSpec((x, (low - 1.0) / 2.0), (thick, low + 1.0)),
-        BoxSpec((x, (high + 1.0) / 2.0), (thick, 1.0 - high)),
+def wall_with_gap(x, thick, middle, width, yaw=0.0):
+    """A wall across the arena and beyond, turned about (x, middle), where its gap is."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    off = width / 2.0 + 1.5
+    return tuple(
+        BoxSpec((x - s * side, middle + c * side), (thick, 3.0), yaw) for side in (-off, off)
     )
 
 
@@ -53,15 +53,19 @@ def guides_or_refusal(planner, start, goal):
         return [], refusal
 
 
-def test_gaps_of_any_width_are_decided_right(robot, box):
-    """120 walls with one gap at a random place. The map may take a cell off either side."""
+@pytest.mark.parametrize(("tilt", "allowance"), [(0.0, 2.0 * CELL), (0.35, 2.0 * 2**0.5 * CELL)])
+def test_gaps_of_any_width_are_decided_right(robot, box, tilt, allowance):
+    """120 walls, one gap each at a random place. The map may take off a cell on either side, or a
+    cell's diagonal where the wall is oblique."""
     random = np.random.default_rng(1)
     found = refused = 0
-    for _ in range(120):
+    for _ in range(60):
         width = random.uniform(0.05, 0.2) if random.random() < 0.5 else random.uniform(0.09, 0.3)
-        x, middle = random.uniform(-0.6, 0.6), random.uniform(-0.8, 0.8)
+        x, middle = random.uniform(-0.3, 0.3), random.uniform(-0.8, 0.8)
         world = EnvironmentSpec(
-            (3.0, 2.0), wall_with_gap(x, random.uniform(0.02, 0.3), middle, width), resolution=CELL
+            (3.0, 2.0),
+            wall_with_gap(x, random.uniform(0.02, 0.3), middle, width, random.uniform(-tilt, tilt)),
+            resolution=CELL,
         )
         planner = PushPlanner(QUICK, rasterise(world), robot, box)
         start = np.array([-1.2, random.uniform(-0.8, 0.8), 0.0])
@@ -69,10 +73,10 @@ def test_gaps_of_any_width_are_decided_right(robot, box):
         guides, refusal = guides_or_refusal(planner, start, goal)
         if refusal is not None:
             assert refusal.code is PlanError.NO_GUIDE_PATH
-            assert width < WIDTH + 2.0 * MARGIN + 2.0 * CELL
+            assert width < WIDTH + 2.0 * MARGIN + allowance
             wide, needed = map(float, re.findall(r"(\d\.\d{3}) m", str(refusal)))
             assert needed == pytest.approx(WIDTH + 2.0 * MARGIN, abs=6e-4)
-            assert width - 2.0 * CELL - 6e-4 < wide < width + 6e-4
+            assert width - allowance - 6e-4 < wide < width + 6e-4
             assert wide < needed
             refused += 1
             continue
@@ -83,7 +87,7 @@ def test_gaps_of_any_width_are_decided_right(robot, box):
             assert guide.clearance >= WIDTH / 2.0 + MARGIN - 0.004
             assert np.array_equal(guide.points[[0, -1]], [start[:2], goal[:2]])
         found += 1
-    assert found > 40 and refused > 25
+    assert found > 20 and refused > 12
 
 
 def test_a_gap_with_just_the_margins_on_both_sides_is_used_to_the_millimetre(robot, box):
