@@ -38,11 +38,11 @@ def test_values_are_exact_distances_to_the_squares_of_occupied_cells():
 
 @pytest.mark.parametrize("resolution", [0.01, 0.05])
 def test_points_bodies_and_segments_against_exact_geometry(resolution):
-    """300 worlds. What is lacking is a cell's diagonal, for obstacles that cells only touch, and
+    """200 worlds. What is lacking is a cell's diagonal, for obstacles that cells only touch, and
     little more."""
     random = np.random.default_rng(2)
     lacking = {"point": [], "body": [], "segment": []}
-    for number in range(150):
+    for number in range(100):
         world = random_world(random, 1 + number % 9, resolution)
         field = DistanceField(rasterise(world))
         spots = random.uniform([-1.5, -1.0], [1.5, 1.0], (30, 2))
@@ -70,7 +70,7 @@ def test_hardly_less_than_exact_on_the_map_itself():
     millimetre of cells of ten, also with points of the outline a centimetre apart."""
     random = np.random.default_rng(3)
     lost = []
-    for _ in range(120):
+    for _ in range(80):
         occupied = np.zeros((200, 300), dtype=bool)
         for _ in range(random.integers(1, 8)):
             row, column = random.integers(0, 180), random.integers(0, 280)
