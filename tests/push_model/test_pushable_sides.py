@@ -165,14 +165,14 @@ def buried(shape, rim, body, pose):
 
 
 def test_no_robot_on_a_pushable_side_overlaps_the_outline():
-    """250 random outlines and robots: in contact, and on the straight way to it."""
+    """200 random outlines and robots: in contact, and on the straight way to it."""
     recessed = spanning = 0
-    for shape, machine in cases(250):
+    for shape, machine in cases(200):
         width, d = machine.flat_bumper.width, machine.push_distance
-        body, rim = filled(convex_hull(machine.outline), 0.01), shape.dense_outline(0.005)
+        body, rim = filled(convex_hull(machine.outline), 0.015), shape.dense_outline(0.005)
         for side in pushable_sides(shape, machine):
             pose, contact = robot_pose(side, width, d)
-            for back in (0.0, 0.01, 0.03, 0.1, 0.3):
+            for back in (0.0, 0.02, 0.2):
                 at = se2.compose(pose, np.array([-back, 0.0, 0.0]))
                 assert buried(shape, rim, body, at) <= 2e-6
             ends = se2.transform(pose, np.array([[d, contact.right], [d, contact.left]]))
@@ -180,13 +180,13 @@ def test_no_robot_on_a_pushable_side_overlaps_the_outline():
             assert contact.left - contact.right > 0.2 * min(width, side.length)
             recessed += side.room is not None and not side.supports
             spanning += bool(side.supports)
-    assert recessed > 100 and spanning > 50
+    assert recessed > 500 and spanning > 30
 
 
 def test_every_recess_that_has_room_is_found():
     """Wherever points say that the robot fits with twice the clearance, the side is there."""
     checked = 0
-    for shape, machine in cases(60):
+    for shape, machine in cases(40):
         width, d = machine.flat_bumper.width, machine.push_distance
         found = {s.index for s in pushable_sides(shape, machine)}
         wide = convex_hull(machine.outline)
@@ -205,7 +205,7 @@ def test_every_recess_that_has_room_is_found():
                     )
                     checked += 1
                     break
-    assert checked > 150
+    assert checked > 100
 
 
 def _in_longer(shape, side, found):
