@@ -103,8 +103,14 @@ def _edges_cross(first: Array, second: Array) -> bool:
         left: Array = (q[..., 0] - p[..., 0]) * (r[..., 1] - p[..., 1])
         return left - (q[..., 1] - p[..., 1]) * (r[..., 0] - p[..., 0])
 
-    apart = (turn(a, b, c) * turn(a, b, d) < 0.0) & (turn(c, d, a) * turn(c, d, b) < 0.0)
-    return bool(apart.any())
+    # Corners on a line, but for rounding, touch it.
+    small = 1e-12 * float(np.ptp(np.vstack([first, second]), axis=0).max()) ** 2
+
+    def apart(one: Array, other: Array) -> Mask:
+        return (np.minimum(one, other) < -small) & (np.maximum(one, other) > small)
+
+    cross = apart(turn(a, b, c), turn(a, b, d)) & apart(turn(c, d, a), turn(c, d, b))
+    return bool(cross.any())
 
 
 def _borders(outline: Array, other: Array) -> bool:
@@ -126,6 +132,7 @@ def _borders(outline: Array, other: Array) -> bool:
     for i in range(len(other)):
         cuts = along[i][on[i] & (along[i] > 0.0) & (along[i] < 1.0)]
         shares = np.array([0.0, *np.sort(cuts), 1.0])
-        middles = 0.5 * (shares[1:] + shares[:-1])
+        long = np.diff(shares) * length[i] > 10.0 * small  # pieces, not corners that coincide
+        middles = (0.5 * (shares[1:] + shares[:-1]))[long]
         points.append(a[i] + middles[:, None] * edge[i] + 2.0 * small * inward[i])
     return bool(inside(outline, np.vstack(points)).any())
