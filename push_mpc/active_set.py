@@ -292,6 +292,9 @@ def solve(
                     _rooms_of(JT[i], S, zero_g, width, normal, zero_bound, family, y, slack, change)
                     _weigh(1.0, JT[i], change, box_weight, row_weight)
                 floor = 1e-10 * box_weight.max()
+                if floor == 0.0:  # the guess filled the space: no direction is left to weigh
+                    for c in range(n):
+                        floor = max(floor, 1e-10 * _dot(JT[:, c], JT[:, c]))
                 weighed, chosen = True, -1
         right = _normal_form(chosen, n, low, high, S, g, width, normal, bound, family, row)
         # 2. towards it, dropping constraints whose multipliers would turn negative

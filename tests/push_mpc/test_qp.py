@@ -72,6 +72,23 @@ def test_start_from_any_working_set_gives_the_same_answer(seed, other, rows):
     assert warm.solve(qp).z == pytest.approx(ActiveSetBackend().solve(qp).z, abs=1e-8)
 
 
+def test_a_guess_that_fills_the_space_is_no_trouble():
+    """As many rows are guessed as there are unknowns, and others are violated at that vertex."""
+    filled = 0
+    for seed in range(200):
+        random = np.random.default_rng(seed)
+        G, f = random.normal(size=(30, 4)), random.normal(size=4) * 100
+        first = Qp.dense(np.eye(4), f, G, np.ones(30), np.full(4, -9.0), np.full(4, 9.0))
+        solver = ActiveSetBackend()
+        solver.solve(first)
+        filled += solver._count == 4
+        moved = Qp.dense(np.eye(4), f, G, random.uniform(0.1, 1, 30), first.low, first.high)
+        result = solver.solve(moved)
+        assert result.solved, result.status
+        assert_optimal(moved, result.z)
+    assert filled > 100
+
+
 def test_start_from_its_own_working_set_takes_one_iteration_a_constraint():
     for seed in range(10):
         qp, solver = random_qp(seed, 12, 40), ActiveSetBackend()
