@@ -8,17 +8,8 @@ import numpy as np
 
 from benchmarks.measure import at_least, at_most, quantiles, thread_times
 from push_model import CurvatureLimits, DifferentialDrive, unicycle_step
-from push_mpc import (
-    ActiveSetBackend,
-    DaqpBackend,
-    LtvMpc,
-    MpcSettings,
-    OsqpBackend,
-    Qp,
-    QpBackend,
-    QpSolution,
-    Reference,
-)
+from push_mpc import LtvMpc, MpcSettings, Reference
+from push_qp import ActiveSetBackend, DaqpBackend, OsqpBackend, Qp, QpBackend, QpSolution
 
 DRIVE = DifferentialDrive(0.0205, 0.0265, 6.28)
 LIMITS = CurvatureLimits(-1.8, 1.8)

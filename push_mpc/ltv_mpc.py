@@ -10,8 +10,8 @@ from push_model.arrays import Array
 from push_model.kinematics import DifferentialDrive
 from push_model.stable_push import CurvatureLimits
 from push_mpc.prediction import OUTPUTS, SLACKS, condense, constant_rows, tick_rows
-from push_mpc.qp import Qp, QpBackend, backend
 from push_mpc.settings import MpcSettings
+from push_qp import Qp, QpBackend, backend
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from push_model import CurvatureLimits, DifferentialDrive
-from push_mpc import (
-    DaqpBackend,
-    LtvMpc,
-    MpcSettings,
-    QpSolution,
-    Reference,
-)
+from push_mpc import LtvMpc, MpcSettings, Reference
+from push_qp import DaqpBackend, QpSolution
 
 DRIVE = DifferentialDrive(0.0205, 0.0265, 6.28)
 LIMITS = CurvatureLimits(-2.0, 2.0)

@@ -9,18 +9,8 @@ import numpy as np
 import pytest
 
 from push_model import CurvatureLimits, DifferentialDrive, line, se2, unicycle_step
-from push_mpc import (
-    ActiveSetBackend,
-    DaqpBackend,
-    LtvMpc,
-    MpcSettings,
-    Push,
-    QpSolution,
-    Task,
-    TrackError,
-    TrackerSettings,
-    TrajectoryTracker,
-)
+from push_mpc import LtvMpc, MpcSettings, Push, Task, TrackError, TrackerSettings, TrajectoryTracker
+from push_qp import ActiveSetBackend, DaqpBackend, QpSolution
 
 DRIVE = DifferentialDrive(0.0205, 0.0265, 6.28)
 GRASP = np.array([0.095, 0.0, 0.0])

@@ -6,17 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from push_model import CurvatureLimits, DifferentialDrive
-from push_mpc import (
-    ActiveSetBackend,
-    DaqpBackend,
-    LtvMpc,
-    MpcSettings,
-    OsqpBackend,
-    Qp,
-    Reference,
-    backend,
-)
-from push_mpc import active_set as kernel
+from push_mpc import LtvMpc, MpcSettings, Reference
+from push_qp import ActiveSetBackend, DaqpBackend, OsqpBackend, Qp, backend
+from push_qp import goldfarb_idnani as kernel
 
 BACKENDS = {"active_set": ActiveSetBackend, "daqp": DaqpBackend, "osqp": lambda: OsqpBackend(1e-9)}
 SEEDS = st.integers(0, 10**6)
