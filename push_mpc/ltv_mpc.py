@@ -76,7 +76,8 @@ class LtvMpc:
         change = np.array([s.max_acceleration_change, s.max_turn_acceleration_change])
         normal, bound, family = constant_rows(p, s.max_obstacles, self.drive.half_track, change)
         width = 2 * np.arange(1, p + 1, dtype=np.int64)
-        return Qp(H, f, low, high, S, np.zeros((p, OUTPUTS)), width, normal, bound, family)
+        equal = np.zeros(len(family), dtype=np.bool_)
+        return Qp(H, f, low, high, S, np.zeros((p, OUTPUTS)), width, normal, bound, family, equal)
 
     def reset(self) -> None:
         """Forget the previous solution."""

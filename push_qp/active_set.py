@@ -9,12 +9,20 @@ from push_qp import goldfarb_idnani
 from push_qp.programme import Index, Qp, QpSolution
 
 
+def iteration_limit(qp: Qp) -> int:
+    """Iterations until a solve is given up: ten an unknown, and one a row.
+
+    Usual are one to two an active row, and there are no more of these than unknowns; a start from
+    a working set that has nothing to do with the programme may take two or three times as many.
+    """
+    return 10 * len(qp.f) + int(qp.bound.size)
+
+
 @dataclass
 class ActiveSetBackend:
     """Starts from the last working set."""
 
     tolerance: float = 1e-8
-    max_iterations: int = 500
     _active: Index = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     _multiplier: Array = field(default_factory=lambda: np.zeros(0))
     _count: int = 0
@@ -38,8 +46,9 @@ class ActiveSetBackend:
             qp.normal,
             qp.bound,
             qp.family,
+            qp.equal,
             self.tolerance,
-            self.max_iterations,
+            iteration_limit(qp),
             z,
             self._active,
             self._multiplier,

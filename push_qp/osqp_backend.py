@@ -4,13 +4,19 @@ import numpy as np
 import osqp
 from scipy import sparse
 
-from push_qp.programme import Qp, QpSolution
+from push_model.arrays import Array
+from push_qp.programme import Flags, Qp
+from push_qp.row_generation import DenseSolution, RowGeneration
 
 
-class OsqpBackend:
-    """Operator splitting; ``tolerance`` is OSQP's eps_abs and eps_rel."""
+class Osqp:
+    """``tolerance`` is OSQP's eps_abs and eps_rel. Starts from the point and the multipliers.
 
-    def __init__(self, tolerance: float = 1e-5, polish: bool = True) -> None:
+    Set up anew each time: a solver that met a NaN stays poisoned.
+    """
+
+    def __init__(self, tolerance: float, polish: bool) -> None:
+        self.tolerance = max(tolerance, 1e-6)
         self._options = {
             "eps_abs": tolerance,
             "eps_rel": tolerance,
@@ -19,26 +25,36 @@ class OsqpBackend:
             "max_iter": 20000,
         }
 
-    def solve(self, qp: Qp) -> QpSolution:
-        """See QpBackend. Set up anew each time: a warm solver that met a NaN stays poisoned."""
-        G, b = qp.rows(qp.all_rows())
+    def solve(
+        self, qp: Qp, G: Array, b: Array, equal: Flags, z: Array, multiplier: Array, known: bool
+    ) -> DenseSolution:
+        """See DenseSolver."""
         n, m = len(qp.f), len(b)
-        if not all(np.isfinite(a).all() for a in (G, b, qp.H, qp.f)):
-            return QpSolution(np.full(n, np.nan), False, "osqp: the programme is not finite")
+        none = np.zeros(n + m)
+        if not (np.isfinite(qp.H).all() and np.isfinite(qp.f).all()):
+            return DenseSolution(np.full(n, np.nan), none, False, "osqp: the cost is not finite")
         solver = osqp.OSQP()
-        rows = sparse.vstack([sparse.csc_matrix(G), sparse.eye(n, format="csc")], format="csc")
         solver.setup(
             sparse.triu(sparse.csc_matrix(qp.H), format="csc"),
             qp.f,
-            rows,
-            np.concatenate([np.full(m, -np.inf), qp.low]),
-            np.concatenate([b, qp.high]),
+            sparse.vstack([sparse.eye(n, format="csc"), sparse.csc_matrix(G)], format="csc"),
+            np.concatenate([qp.low, np.where(equal, b, -np.inf)]),
+            np.concatenate([qp.high, b]),
             **self._options,
         )
-        result = solver.solve()
-        z = np.zeros(n) if result.x is None else np.asarray(result.x)
-        solved = result.info.status in ("solved", "solved inaccurate")
-        return QpSolution(z, solved and bool(np.isfinite(z).all()), f"osqp {result.info.status}")
+        if known:
+            solver.warm_start(x=z, y=multiplier)
+        result = solver.solve(raise_error=False)
+        solved = result.x is not None and result.info.status in ("solved", "solved inaccurate")
+        best = np.asarray(result.x) if solved else np.full(n, np.nan)
+        prices = np.asarray(result.y) if solved else none
+        return DenseSolution(best, prices, solved, f"osqp {result.info.status}")
 
-    def reset(self) -> None:
-        """See QpBackend."""
+
+class OsqpBackend(RowGeneration):
+    """OSQP with every row, or with rows as they are needed."""
+
+    def __init__(
+        self, tolerance: float = 1e-5, polish: bool = True, every_row: bool = True
+    ) -> None:
+        super().__init__(Osqp(tolerance, polish), every_row)

@@ -1,8 +1,10 @@
 """Rows of a programme as combinations of the outputs of its steps: checked, and written out."""
 
+import math
 from typing import Any
 
 import numba
+import numpy as np
 
 
 @numba.njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
@@ -46,3 +48,50 @@ def write_row(
     if family[j] >= 0:
         row[inputs + family[j]] = -1.0
     return float(right)
+
+
+@numba.njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
+def write_rows(
+    S: Any, g: Any, width: Any, normal: Any, bound: Any, family: Any, numbers: Any, G: Any, b: Any
+) -> None:
+    """Rows k r + j as G z <= b, from the first row of G ``(>= m, n)`` and b ``(>= m,)`` on."""
+    for i in range(numbers.shape[0]):
+        k, j = divmod(numbers[i], bound.shape[1])
+        b[i] = write_row(S, g, width, normal, bound, family, k, j, G[i])
+
+
+@numba.njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
+def violated(
+    S: Any,
+    g: Any,
+    width: Any,
+    normal: Any,
+    bound: Any,
+    family: Any,
+    z: Any,
+    tolerance: float,
+    chosen: Any,
+    room: Any,
+    numbers: Any,
+) -> int:
+    """How many rows beyond those ``chosen`` ``(K r,)`` are violated at z; -1: it cannot be told.
+
+    Their numbers are written into ``numbers`` ``(K r,)`` and they are marked in ``chosen``;
+    room ``(K, r)`` is filled in.
+    """
+    y, slack = np.empty(g.shape), np.empty(bound.shape[1])
+    outputs(S, g, width, z, y)
+    for j in range(family.shape[0]):
+        slack[j] = z[S.shape[2] + family[j]] if family[j] >= 0 else 0.0
+    rooms(normal, bound, y, slack, room)
+    count = 0
+    for k in range(bound.shape[0]):
+        for j in range(bound.shape[1]):
+            if math.isnan(room[k, j]):
+                return -1
+            number = k * bound.shape[1] + j
+            if room[k, j] < -tolerance and not chosen[number]:
+                numbers[count] = number
+                chosen[number] = True
+                count += 1
+    return count
