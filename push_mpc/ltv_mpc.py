@@ -2,43 +2,16 @@
 
 import math
 import time
-from dataclasses import dataclass
 
 import numpy as np
 
 from push_model.arrays import Array
 from push_model.kinematics import DifferentialDrive
 from push_model.stable_push import CurvatureLimits
+from push_mpc.controller import MpcResult, Reference
 from push_mpc.prediction import OUTPUTS, SLACKS, condense, constant_rows, tick_rows
 from push_mpc.settings import MpcSettings
 from push_qp import Qp, QpBackend, backend
-
-
-@dataclass(frozen=True)
-class Reference:
-    """What to track over the horizon.
-
-    pose: ``(p + 1, 3)`` world frame; twist: ``(p + 1, 3)`` v_d, w_d, omega_d of that frame, in it.
-    """
-
-    pose: Array
-    twist: Array
-
-
-@dataclass(frozen=True)
-class MpcResult:
-    """acceleration: (a, epsilon) to apply now; slack: greatest violation; solve_time [s] CPU.
-
-    solved is False when the acceleration must not be used; reason says why. late: only because it
-    came after its deadline.
-    """
-
-    acceleration: tuple[float, float]
-    solved: bool
-    slack: float
-    solve_time: float
-    reason: str
-    late: bool = False
 
 
 class LtvMpc:
@@ -55,6 +28,30 @@ class LtvMpc:
         self._R, self._Rd = np.array(settings.input_weight), np.array(settings.input_rate_weight)
         self._rollout = np.zeros((settings.horizon + 1, 5))
         self._qp = self._programme()
+        self.reset()
+
+    @property
+    def horizon(self) -> int:
+        """See PredictiveController."""
+        return self.settings.horizon
+
+    @property
+    def step(self) -> float:
+        """See PredictiveController."""
+        return self.settings.step
+
+    @property
+    def max_obstacles(self) -> int:
+        """See PredictiveController."""
+        return self.settings.max_obstacles
+
+    def warm_up(self) -> None:
+        """See PredictiveController."""
+        p = self.settings.horizon
+        still = Reference(np.zeros((p + 1, 3)), np.zeros((p + 1, 3)))
+        circles = np.array([[1.0, 0.0, 0.5]])[: self.settings.max_obstacles]
+        self.solve(np.full(5, 1e-3), still, CurvatureLimits(-1.0, 1.0), circles)
+        self.solve(np.full(5, 1e-3), still, None, np.zeros((0, 3)))
         self.reset()
 
     def _programme(self) -> Qp:
@@ -88,18 +85,11 @@ class LtvMpc:
     def solve(
         self, error: Array, reference: Reference, limits: CurvatureLimits | None, circles: Array
     ) -> MpcResult:
-        """One step.
-
-        Parameters
-        ----------
-        error: ``(5,)`` of (2.37).
-        reference: over the horizon, first sample now.
-        limits: stable curvatures now, in a push; None when the robot moves alone.
-        circles: ``(m, 3)`` x, y, least distance of the axle midpoint; m <= max_obstacles.
+        """See PredictiveController.
 
         Raises
         ------
-        ValueError: more circles than that.
+        ValueError: more circles than max_obstacles.
         """
         started = time.thread_time()
         # a sum is finite only if every term is

@@ -220,7 +220,7 @@ class ControllerNode(Node):
             if self.tracker.active:
                 self._end(FollowTrajectory.Result.CLOCK_RESET, "the clock went back")
         if verdict is Stamp.RESUMED:
-            self.tracker.v = self.tracker.omega = 0.0
+            self.tracker.halt()
         dt = self._poses.stamp - before if verdict is Stamp.OK and before > 0.0 else 0.01
         self._step(dt, seen)
 
@@ -238,7 +238,7 @@ class ControllerNode(Node):
         robot = self._poses.pose(self.robot)
         item = self._poses.pose(self._object) if self._object else None
         if robot is None or (self._object and item is None):
-            tracker.v = tracker.omega = 0.0
+            tracker.halt()
             self._mode = ControllerStatus.HOLD
             self._reason = f"no valid pose of {self.robot if robot is None else self._object}"
             self._held += dt
@@ -325,7 +325,7 @@ class ControllerNode(Node):
         silence = time.monotonic() - self._last_wall
         if not self.tracker.active or silence < 2.0 * self._poses.settings.timeout:
             return
-        self.tracker.v = self.tracker.omega = 0.0
+        self.tracker.halt()
         self._publish_command(0.0, 0.0)
         if silence > _GIVE_UP:
             self._end(FollowTrajectory.Result.POSES_STALE, f"no poses for {silence:.1f} s")

@@ -135,7 +135,7 @@ def under_way(solver=None, settings=None):
 def test_failed_solves_stop_the_robot_and_are_reported():
     """FAULTS 5: a problem without a solution stops it in the same tick; ten end the task."""
     tracker, robot = under_way()
-    tracker.mpc._solver = Broken()
+    tracker.controller._solver = Broken()
     ticks = [tick for tick, _ in drive(tracker, robot, 5)]
     assert all((t.v, t.omega) == (0.0, 0.0) for t in ticks)
     assert ticks[-1].code is TrackError.SOLVER_FAILED and ticks[-1].message == "broken"
@@ -182,7 +182,7 @@ def test_delay_is_made_good_by_the_commands_since():
             tick = tracker.tick(0.01, past[-1 - delay], None)
             past.append(unicycle_step(past[-1], tick.v, tick.omega, 0.01))
             if k > 200 and not tick.finished:
-                now, _ = tracker._task.trajectory.sample(np.array([tracker._time]))
+                now, _ = tracker._task.trajectory.sample(np.array([tracker._clock.time]))
                 worst = max(worst, abs(past[-1][0] - now[0, 0]))
             if tick.finished:
                 break
