@@ -12,13 +12,12 @@ from std_msgs.msg import Header
 from push_model.kinematics import unicycle_step
 from push_model.settings import SettingsError
 from push_mpc import (
-    LtvMpc,
-    MpcSettings,
     Push,
     Task,
     Tick,
     TrackerSettings,
     TrajectoryTracker,
+    controller_kind,
 )
 from push_msgs.action import FollowTrajectory
 from push_msgs.msg import ControllerStatus, NamedPoses
@@ -52,13 +51,16 @@ class ControllerNode(Node):
         self.robot, spec = self._scenario.robot(robot)
         values = dict(self._scenario.parameters.get("controller", {}))
         sections = {k: values.pop(k, {}) for k in ("mpc", "tracker", "poses")}
+        default = str(values.pop("controller", "ltv"))
         if values:
             raise SettingsError(
-                f"controller: unknown key '{next(iter(values))}'; expected mpc, tracker or poses"
+                f"controller: unknown key '{next(iter(values))}'; expected controller, mpc, "
+                "tracker or poses"
             )
         self._drive = spec.drive
+        self._kind = controller_kind(str(self.declare_parameter("controller", default).value))
         self._mpc_settings = declare_settings(
-            self, MpcSettings, sections["mpc"], "mpc", "controller.mpc", self._apply_mpc
+            self, self._kind.settings, sections["mpc"], "mpc", "controller.mpc", self._apply_mpc
         )
         self._tracker_settings = declare_settings(
             self,
@@ -116,7 +118,7 @@ class ControllerNode(Node):
         if self.tracker.active:
             raise SettingsError("the controller is busy; change its parameters when it is idle")
 
-    def _apply_mpc(self, settings: MpcSettings) -> None:
+    def _apply_mpc(self, settings: Any) -> None:
         self._busy()
         self._mpc_settings = settings
         self._rebuild()
@@ -128,7 +130,7 @@ class ControllerNode(Node):
 
     def _rebuild(self) -> None:
         self.tracker = TrajectoryTracker(
-            self._tracker_settings, LtvMpc(self._mpc_settings, self._drive)
+            self._tracker_settings, self._kind.make(self._mpc_settings, self._drive)
         )
         self.tracker.warm_up()
 
