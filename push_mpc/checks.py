@@ -13,6 +13,10 @@ from push_mpc.task import Task, TrackError
 Verdict = tuple[TrackError, str]
 FINE: Verdict = (TrackError.NONE, "")
 
+_ALONG = 0.5  # of the tolerance: a push goes on until so little is left along its way
+_NEARLY = 3.0  # times the tolerances: what is left then is the next plan's to mend, not a failure
+_MOVED = 0.1  # of the commanded way: wheels that slip a lot still do better
+
 
 class EndCheck:
     """Whether what counts has come to rest where it should, or is not worth waiting for."""
@@ -30,17 +34,18 @@ class EndCheck:
         along: [m] that the robot is behind its end. gap, turn: [m], [rad] of what counts to there.
         """
         self._overtime += dt
-        slow = abs(v) < 0.01 and abs(omega) < 0.1
-        late = self._overtime > self._settings.settle_time
+        s = self._settings
+        slow = abs(v) < s.rest_speed and abs(omega) < s.rest_turn_rate
+        late = self._overtime > s.settle_time
         if self._task.push is not None:
             # A push cannot be undone: what is left across the way stays.
-            return (slow and along < 0.5 * self._task.position_tolerance) or late
+            return (slow and along < _ALONG * self._task.position_tolerance) or late
         return (slow and self._within(gap, turn, 1.0)) or late
 
     def verdict(self, gap: float, turn: float) -> Verdict:
         """Of a task that has ended."""
         late = self._overtime > self._settings.settle_time
-        if late and not self._within(gap, turn, 3.0):
+        if late and not self._within(gap, turn, _NEARLY):
             return TrackError.TIMEOUT, f"ended {1e3 * gap:.1f} mm and {turn:.3f} rad off"
         return FINE
 
@@ -50,10 +55,14 @@ class EndCheck:
 
 
 class FailureCheck:
-    """Off course, contact lost, blocked, stuck; in this order."""
+    """Off course, contact lost, blocked, stuck; in this order.
 
-    def __init__(self, settings: TrackerSettings) -> None:
+    lever: [m] by which turning counts as moving, that of the wheels.
+    """
+
+    def __init__(self, settings: TrackerSettings, lever: float) -> None:
         self._settings = settings
+        self._lever = lever
         self._lost = 0.0
         self._history: deque[tuple[float, Array]] = deque()
         self._commanded = 0.0
@@ -92,7 +101,7 @@ class FailureCheck:
     def _contact(self, dt: float, grasp: GraspEstimate) -> Verdict:
         s = self._settings
         gap, aside, turn = grasp.apart
-        apart = gap > s.contact_gap or turn > s.contact_turn or aside > 3.0 * s.contact_gap
+        apart = gap > s.contact_gap or turn > s.contact_turn or aside > s.contact_aside
         self._lost = self._lost + dt if apart else 0.0
         if self._lost > s.contact_time:
             return TrackError.CONTACT_LOST, (
@@ -112,12 +121,12 @@ class FailureCheck:
     def _stuck(self, dt: float, robot: Array, command: tuple[float, float]) -> Verdict:
         s = self._settings
         self._history.append((dt, robot))
-        self._commanded += abs(command[0]) * dt + abs(command[1]) * 0.03 * dt
+        self._commanded += abs(command[0]) * dt + abs(command[1]) * self._lever * dt
         span = sum(step for step, _ in self._history)
         if span >= s.stuck_time:
             moved = se2.between(self._history[0][1], robot)
-            way = float(np.hypot(moved[0], moved[1])) + 0.03 * abs(float(moved[2]))
-            if self._commanded > s.stuck_way and way < 0.1 * self._commanded:
+            way = float(np.hypot(moved[0], moved[1])) + self._lever * abs(float(moved[2]))
+            if self._commanded > s.stuck_way and way < _MOVED * self._commanded:
                 return TrackError.STUCK, (
                     f"commanded {1e3 * self._commanded:.0f} mm in {span:.1f} s but moved "
                     f"{1e3 * way:.1f} mm"

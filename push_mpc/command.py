@@ -3,8 +3,7 @@
 from push_model.kinematics import DifferentialDrive
 from push_model.stable_push import CurvatureLimits
 from push_mpc.controller import MpcResult
-
-_FADE = 0.1  # [s] in which the last command fades to zero while solves are late
+from push_mpc.settings import TrackerSettings
 
 
 class Command:
@@ -13,7 +12,8 @@ class Command:
     solves, failures: since it was made; failed: in a row.
     """
 
-    def __init__(self, drive: DifferentialDrive) -> None:
+    def __init__(self, settings: TrackerSettings, drive: DifferentialDrive) -> None:
+        self._settings = settings
         self._drive = drive
         self.v = 0.0
         self.omega = 0.0
@@ -21,6 +21,11 @@ class Command:
         self.failures = 0
         self.failed = 0
         self._faded = 1.0
+
+    @property
+    def given_up(self) -> bool:
+        """Whether too many solves in a row have failed."""
+        return self.failed >= self._settings.solver_patience
 
     def start(self) -> None:
         """A new task: no failure in a row yet."""
@@ -36,7 +41,7 @@ class Command:
         if not solve.solved:
             self.failures += 1
             self.failed += 1
-            left = max(0.0, self._faded - dt / _FADE) if solve.late else 0.0
+            left = max(0.0, self._faded - dt / self._settings.fade_time) if solve.late else 0.0
             keep = left / self._faded if self._faded > 0.0 else 0.0
             self.v, self.omega, self._faded = self.v * keep, self.omega * keep, left
             return

@@ -9,7 +9,9 @@ from push_model.trajectory import Trajectory
 from push_mpc.controller import Reference
 from push_mpc.settings import TrackerSettings
 
-_HALTED = 0.02  # of the nominal pace: slower than that, the reference stands still
+# Of the nominal pace. Slower than that, the reference stands still: before a robot that does not
+# move it approaches lag_end for ever, and never quite comes to rest.
+_HALTED = 0.02
 
 
 class ReferenceClock:

@@ -47,14 +47,25 @@ class TrackerSettings:
     orientation_tolerance: float = bounded(0.03, low=1e-4, high=3.2, doc="[rad] at the end")
     settle_time: float = bounded(3.0, low=0.0, high=60.0, doc="[s] to reach the tolerance")
     grasp_filter: float = bounded(0.2, low=0.0, high=10.0, doc="[s] time constant, object in robot")
+    rest_speed: float = bounded(0.01, low=1e-4, high=1.0, doc="[m/s] that counts as at rest")
+    rest_turn_rate: float = bounded(0.1, low=1e-3, high=10.0, doc="[rad/s] that counts as at rest")
     lag_begin: float = bounded(0.02, low=1e-3, high=1.0, doc="[m] lag that slows the reference")
     lag_end: float = bounded(0.06, low=2e-3, high=1.0, doc="[m] lag that halts the reference")
     contact_gap: float = bounded(0.015, low=1e-3, high=1.0, doc="[m] object to bumper")
+    contact_aside: float = bounded(
+        0.045, low=1e-3, high=1.0, doc="[m] object along the bumper, from its place"
+    )
     contact_turn: float = bounded(0.25, low=0.01, high=3.2, doc="[rad] object against bumper")
     contact_time: float = bounded(0.5, low=0.0, high=10.0, doc="[s] until contact counts as lost")
     off_course: float = bounded(0.08, low=1e-3, high=5.0, doc="[m] from the reference")
     deadline: float = bounded(
         0.0, low=0.0, high=10.0, doc="[s] wall time a solve may take in live use; 0: not watched"
+    )
+    solver_patience: int = bounded(
+        10, low=1, high=10000, doc="failed or late solves in a row that end the task"
+    )
+    fade_time: float = bounded(
+        0.1, low=1e-3, high=10.0, doc="[s] in which the command fades to zero while solves are late"
     )
     stuck_time: float = bounded(1.5, low=0.1, high=60.0, doc="[s] commanded but not moving")
     stuck_way: float = bounded(0.03, low=1e-3, high=1.0, doc="[m] commanded in that time")

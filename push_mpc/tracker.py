@@ -24,7 +24,8 @@ from push_mpc.reference_clock import ReferenceClock
 from push_mpc.settings import TrackerSettings
 from push_mpc.task import Task, Tick, TrackError
 
-_SOLVER_PATIENCE = 10  # failed solves in a row until the task is given up
+_REACH = 1.5  # of the way that the horizon covers at full speed: nothing farther can bind
+_MOVING = 1e-3  # [m/s]: slower than that, omega / v is no curvature but noise
 
 
 class TrajectoryTracker:
@@ -33,7 +34,7 @@ class TrajectoryTracker:
     def __init__(self, settings: TrackerSettings, controller: PredictiveController) -> None:
         self.settings = settings
         self.controller = controller
-        self._command = Command(controller.drive)
+        self._command = Command(settings, controller.drive)
         self._task: Task | None = None
 
     @property
@@ -75,7 +76,7 @@ class TrajectoryTracker:
             else GraspEstimate(task.push.grasp, self.settings.grasp_filter)
         )
         self._end = EndCheck(self.settings, task)
-        self._failure = FailureCheck(self.settings)
+        self._failure = FailureCheck(self.settings, self.controller.drive.half_track)
         self._lag = 0.0  # [m] behind the reference, at the tick before
         self._recent: deque[tuple[float, float, float]] = deque()
         self._command.start()
@@ -135,11 +136,11 @@ class TrajectoryTracker:
         else:
             solve = self._solve(error, reference, limits, self._nearest(task, room))
             self._command.apply(solve, dt, limits)
-            if self._command.failed >= _SOLVER_PATIENCE:
+            if self._command.given_up:
                 finished, code, message = True, TrackError.SOLVER_FAILED, solve.reason
                 self.stop()
         curvature_margin = math.inf
-        if limits is not None and self.v > 1e-3:
+        if limits is not None and self.v > _MOVING:
             kappa = self.omega / self.v
             curvature_margin = min(limits.maximum - kappa, kappa - limits.minimum)
         return Tick(
@@ -210,7 +211,7 @@ class TrajectoryTracker:
         """The obstacles ``(n, 3)`` within reach, no more than the controller takes."""
         controller = self.controller
         count = controller.max_obstacles
-        reach = 1.5 * controller.drive.max_speed * controller.step * controller.horizon
+        reach = _REACH * controller.drive.max_speed * controller.step * controller.horizon
         close = np.flatnonzero(room < reach)
         if len(close) > count:
             close = close[np.argpartition(room[close], count)[:count]]

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from push_model import CurvatureLimits, DifferentialDrive, line, se2, unicycle_step
+from push_model import CurvatureLimits, DifferentialDrive, line, rotation, se2, unicycle_step
 from push_mpc import LtvMpc, MpcSettings, Push, Task, TrackError, TrackerSettings, TrajectoryTracker
 from push_qp import ActiveSetBackend, DaqpBackend, QpSolution
 
@@ -90,6 +90,31 @@ def test_frozen_poses_are_noticed():
     ticks = list(drive(tracker, np.zeros(3), 20, motion=lambda r, v, w, dt: r))
     assert ticks[-1][0].code is TrackError.STUCK and (ticks[-1][0].v, ticks[-1][0].omega) == (0, 0)
     assert len(ticks) < 600
+
+
+@pytest.mark.parametrize("half_track", [0.0265, 0.165])
+def test_a_turn_against_a_wall_is_noticed_whatever_the_robot_s_width(half_track):
+    """A wide robot's wheels run far in a small turn: its lever is its own, not the e-puck's."""
+    drive = DifferentialDrive(0.08, half_track, 6.28)
+    settings = replace(TrackerSettings(), stuck_way=0.05, blocked_time=60.0, settle_time=60.0)
+    tracker = TrajectoryTracker(settings, LtvMpc(MpcSettings(), drive))
+    angle, rate = (0.4, 0.3) if half_track > 0.1 else (2.5, 2.0)
+    turn = rotation(np.zeros(3), angle, rate, 20.0 * rate)
+    tracker.start(Task(turn, None, NONE, 0.006, 0.03))
+    for _ in range(400):
+        tick = tracker.tick(0.01, np.zeros(3), None)
+        if tick.finished:
+            break
+    assert tick.code is TrackError.STUCK and "commanded" in tick.message
+
+
+@pytest.mark.parametrize(("allowed", "code"), [(0.045, "CONTACT_LOST"), (0.08, "NONE")])
+def test_how_far_an_object_may_slide_along_the_bumper_is_a_setting(allowed, code):
+    tracker = make(replace(TrackerSettings(), contact_aside=allowed))
+    tracker.start(task(0.8))
+    slid = GRASP + [0.0, 0.055, 0.0]
+    ticks = drive(tracker, np.zeros(3), 3, lambda t, r: se2.compose(r, slid))
+    assert [tick.code.name for tick, _ in ticks][-1] == code
 
 
 def test_pushed_off_course_is_noticed():
