@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from push_bringup.recorder import revision
+from push_record.recorder import revision
 
 
 def run(what: str, out: Path | None) -> int:

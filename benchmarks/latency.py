@@ -13,8 +13,8 @@ from benchmarks.measure import at_most
 from push_bringup.launcher import Child, Launcher
 from push_model import line, unicycle_step
 from push_msgs.action import FollowTrajectory
-from push_msgs.msg import NamedPose, NamedPoses
-from push_ros.conversions import pose_to_ros, time_to_ros, trajectory_to_ros
+from push_msgs.msg import Poses
+from push_ros.conversions import poses_to_ros, trajectory_to_ros
 from push_ros.process import Spinner, claim_domain, prepare_environment
 from push_ros.qos import COMMAND, STREAM
 
@@ -40,7 +40,8 @@ def run(seconds: float = 15.0) -> dict[str, Any]:
             state["robot"], message.twist.linear.x, message.twist.angular.z, 0.01
         )
 
-    publisher = node.create_publisher(NamedPoses, "/poses", STREAM)
+    publisher = node.create_publisher(Poses, "/poses", STREAM)
+    aside = np.array([1.4, 0.8, 0.0])
     node.create_subscription(TwistStamped, "/epuck1/cmd_vel", on_command, COMMAND)
     client = ActionClient(node, FollowTrajectory, "/epuck1/follow_trajectory")
     try:
@@ -54,14 +55,7 @@ def run(seconds: float = 15.0) -> dict[str, Any]:
         following = time.perf_counter()
         while time.perf_counter() < end:
             tick += 1
-            message = NamedPoses(
-                poses=[
-                    NamedPose(name="epuck1", pose=pose_to_ros(state["robot"])),
-                    NamedPose(name="box", pose=pose_to_ros(np.array([1.4, 0.8, 0.0]))),
-                ]
-            )
-            message.header.frame_id = "map"
-            message.header.stamp = time_to_ros(tick / 100)
+            message = poses_to_ros({"epuck1": state["robot"], "box": aside}, tick / 100)
             sent[tick] = time.perf_counter()
             publisher.publish(message)
             following += 0.01

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks.measure import at_least
-from push_bringup.lockstep import LockstepRun
 from push_ros.process import claim_domain
-from push_ros.scenario import load_scenario
+from push_scenario.scenario import load_scenario
+from push_study.graph_run import LockstepRun
 from sim_bridge.world import World
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from benchmarks.measure import at_least, at_most
 from push_model import se2, uniform_pressure_radius
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
-from push_ros.scenario import load_scenario
+from push_scenario.scenario import load_scenario
 from sim_bridge.world import World
 
 OPEN = EnvironmentSpec((8.0, 8.0), resolution=0.02)

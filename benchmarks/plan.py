@@ -5,7 +5,7 @@ from typing import Any
 
 from benchmarks.measure import at_most
 from push_planner import PlannerSettings, PlanningFailed, PushPlanner
-from push_ros.scenario import load_scenario, scenario_names
+from push_scenario.scenario import load_scenario, scenario_names
 
 
 def run() -> dict[str, Any]:

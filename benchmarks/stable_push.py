@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.measure import at_least, at_most
 from push_model import contact_on_side, curvature_limits, se2
 from push_model.specs import EnvironmentSpec, ObjectSpec
-from push_ros.scenario import load_scenario
+from push_scenario.scenario import load_scenario
 from sim_bridge.world import World
 
 INSIDE, OUTSIDE = 0.92, 1.15  # of the limiting curvature
@@ -32,7 +32,8 @@ def slip(task: tuple[str, int, float, float, float]) -> float:
     name, index, mu, kappa, degrees = task
     vertices = tuple(tuple(v) for v in POLYGONS[name])
     item = ObjectSpec({"polygon": {"vertices": vertices}}, 0.05, 0.06, 0.3, mu, feet=8)
-    robot = replace(load_scenario("short").robot()[1], mass=1.0, wheel_torque=0.5)
+    robot = load_scenario("short").robot()[1]
+    robot = replace(robot, mass=1.0, drive=replace(robot.drive, wheel_torque=0.5))
     contact = contact_on_side(item.geometry.sides[index], robot.bumper.width)
     grasp = contact.object_pose + [robot.bumper.distance + 0.0008, 0.0, 0.0]
     environment = EnvironmentSpec((6.0, 6.0), resolution=0.05)

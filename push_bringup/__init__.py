@@ -1,1 +1,1 @@
-"""Launch, record, watch and evaluate: the command line and what stands behind it."""
+"""Which nodes make up a system; start them, watch them, talk to them."""

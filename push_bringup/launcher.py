@@ -59,7 +59,7 @@ class Launcher:
                 self._start(child)
 
     def _start(self, child: Child) -> None:
-        command = [sys.executable, "-m", "push_bringup.cli", "node", *child.words]
+        command = [sys.executable, "-m", "planar_push.cli", "node", *child.words]
         child.process = subprocess.Popen(
             command, env=self._environment, start_new_session=True, preexec_fn=die_with_parent
         )

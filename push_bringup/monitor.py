@@ -10,9 +10,9 @@ from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import OccupancyGrid
 from rclpy.signals import SignalHandlerOptions
 
-from push_msgs.msg import NamedPoses, SupervisorState
+from push_msgs.msg import JobState, Poses
 from push_ros.conversions import pose_stamped_to_ros, time_from_ros
-from push_ros.process import Spinner, prepare_environment, reaches
+from push_ros.process import Spinner, heard, prepare_environment
 from push_ros.qos import COMMAND, LATCHED, STREAM
 
 
@@ -26,18 +26,17 @@ class Monitor:
         prepare_environment()
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         self._node = rclpy.create_node("monitor")
-        self.state: SupervisorState | None = None
+        self.state: JobState | None = None
         self.position: tuple[float, float] | None = None
         self.stamp = 0.0  # [s] of the newest poses
         self._map = False
         self._news = 0
         self._goal: tuple[float, float, float] | None = None
-        self._publisher = self._node.create_publisher(PoseStamped, "/goal_pose", COMMAND)
-        self._node.create_subscription(
-            SupervisorState, "/supervisor/state", self._on_state, LATCHED
-        )
-        self._node.create_subscription(OccupancyGrid, "/map", self._on_map, LATCHED)
-        self._node.create_subscription(NamedPoses, "/poses", self._on_poses, STREAM)
+        self._sent: PoseStamped | None = None
+        self._publisher = self._node.create_publisher(PoseStamped, "goal_pose", COMMAND)
+        self._node.create_subscription(JobState, "job_state", self._on_state, LATCHED)
+        self._node.create_subscription(OccupancyGrid, "map", self._on_map, LATCHED)
+        self._node.create_subscription(Poses, "poses", self._on_poses, STREAM)
         self._spinner = Spinner([self._node])
         return self
 
@@ -45,7 +44,7 @@ class Monitor:
         self._spinner.close()
         rclpy.try_shutdown()
 
-    def _on_state(self, message: SupervisorState) -> None:
+    def _on_state(self, message: JobState) -> None:
         self.state = message
         self._news += 1
         if self._goal is not None:
@@ -54,11 +53,10 @@ class Monitor:
     def _on_map(self, message: OccupancyGrid) -> None:
         self._map = True
 
-    def _on_poses(self, message: NamedPoses) -> None:
+    def _on_poses(self, message: Poses) -> None:
         self.stamp = time_from_ros(message.header.stamp)
-        if len(message.poses) >= 2:
-            p = message.poses[-1].pose.position
-            self.position = (p.x, p.y)
+        if len(message.names) >= 2:
+            self.position = (message.x[-1], message.y[-1])
 
     def wait(self, limit: float, condition: Callable[[], bool]) -> bool:
         """Spin until the condition holds; whether it did within limit [s] of wall time."""
@@ -72,7 +70,7 @@ class Monitor:
                 self.state is not None
                 and self._map
                 and self.position is not None
-                and reaches(self._node, self._publisher, "supervisor")
+                and heard(self._node, self._publisher)
                 and self.supervised
             )
             if ready:
@@ -83,18 +81,19 @@ class Monitor:
     @property
     def supervised(self) -> bool:
         """Whether there is a supervisor; one that was killed is missed after some seconds."""
-        return int(self._node.count_publishers("/supervisor/state")) > 0
+        return int(self._node.count_publishers("job_state")) > 0
 
     def send_goal(self, goal: tuple[float, float, float]) -> None:
         """Publish a goal (x, y, theta) [m, m, rad]."""
         self._goal = goal
         self._news = 0
-        self._publisher.publish(pose_stamped_to_ros(np.array(goal), 0.0))
+        # its stamp tells it from the goals of others
+        self._sent = pose_stamped_to_ros(np.array(goal), time.time())
+        self._publisher.publish(self._sent)
 
-    def _is_mine(self, state: SupervisorState) -> bool:
-        assert self._goal is not None
-        p = state.goal.pose.position
-        return bool(np.hypot(p.x - self._goal[0], p.y - self._goal[1]) < 1e-6)
+    def _is_mine(self, message: PoseStamped) -> bool:
+        assert self._sent is not None
+        return bool(message == self._sent)
 
     def follow(self, limit: float, alive: Callable[[], bool]) -> int:
         """Show progress until the job ends, or its plan waits for the execute command.
@@ -104,6 +103,7 @@ class Monitor:
         assert self._goal is not None
         end = time.monotonic() + limit
         shown = 0.0
+        began = False
         while time.monotonic() < end:
             if not alive():
                 print("error: the nodes have ended before the job", file=sys.stderr)
@@ -111,10 +111,16 @@ class Monitor:
             self._spinner.once(0.1)
             state = self.state
             if self._news and state is not None:
-                if state.reason.startswith("goal refused"):
-                    return 1  # a job of somebody else goes on, or none
-                if state.state == SupervisorState.IDLE:
-                    return 0 if state.error_code == 0 and self._is_mine(state) else 1
+                if state.refusals and self._is_mine(state.refused_goal):
+                    print(f"  goal refused: {state.refusal}", flush=True)
+                    return 1
+                if self._is_mine(state.goal):
+                    began = True
+                    if state.state == JobState.IDLE:
+                        return 0 if state.error_code == 0 else 1
+                elif began:
+                    print("error: another goal has replaced this one", file=sys.stderr)
+                    return 1
             if time.monotonic() - shown > 2.0 and self.position is not None:
                 shown = time.monotonic()
                 gap = np.hypot(self.position[0] - self._goal[0], self.position[1] - self._goal[1])

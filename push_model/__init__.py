@@ -15,7 +15,8 @@ from push_model.limit_surface import (
 )
 from push_model.push_segment import PushSegment
 from push_model.settings import SettingsError, from_mapping
-from push_model.shapes import Shape, Side, ellipse, flower, polygon, rectangle, shape_from_mapping
+from push_model.shape_specs import shape_from_mapping
+from push_model.shapes import Shape, Side, ellipse, flower, polygon, rectangle
 from push_model.stable_push import (
     CurvatureLimits,
     PusherContact,

@@ -1,21 +1,34 @@
-"""Settings: frozen dataclasses filled from mappings, with every error naming file, key and value.
+"""Settings: frozen dataclasses whose values are checked, with errors naming file, key and value.
 
-A settings class is a frozen dataclass. A field may carry bounds in its metadata, put there with
-``bounded``. Cross-field checks go into ``__post_init__`` and raise ``SettingsError``.
+``@settings`` makes a class a frozen dataclass that pydantic checks whenever it is built, from a
+file or in code. A field may carry bounds, put there with ``bounded``. Checks across fields go into
+``__post_init__`` and raise ``SettingsError``. A union of settings classes is told apart by their
+field ``kind``, a ``Literal`` with that default.
+
+Nothing is guessed: a number is no text and no truth value, infinities and nan are no numbers. A
+whole number will do where a number is wanted, and a list where a tuple is.
 """
 
 import dataclasses
+import functools
+import inspect
 import math
 import types
 import typing
 from collections.abc import Mapping
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
+
+import pydantic
+import pydantic.dataclasses
+from annotated_types import Ge, Le
+from pydantic import AllowInfNan, BeforeValidator, Strict
+
+from push_model.settings_errors import SettingsError, explained
+
+__all__ = ["SettingsError", "bounded", "from_mapping", "settings"]
 
 T = TypeVar("T")
-
-
-class SettingsError(ValueError):
-    """A setting is unknown, missing, of the wrong type or out of range."""
+_CONFIG = pydantic.ConfigDict(extra="forbid", validate_default=True)
 
 
 def bounded(
@@ -25,116 +38,110 @@ def bounded(
     high: float = math.inf,
     doc: str = "",
 ) -> Any:
-    """A dataclass field with a value in [low, high]; ``doc`` says what it is, in which unit."""
+    """A dataclass field with a value in [low, high]; ``doc`` says what it is, in which unit.
+
+    Bounds hold for each number of a tuple, and for an optional number when it is given.
+    """
     metadata = {"low": low, "high": high, "doc": doc}
     if default is dataclasses.MISSING:
         return dataclasses.field(metadata=metadata)
     return dataclasses.field(default=default, metadata=metadata)
 
 
+@typing.dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field,))
+def settings(cls: type[T]) -> type[T]:
+    """Make a class a frozen dataclass whose values are checked when it is built.
+
+    Raises
+    ------
+    SettingsError: by the class's constructor, ``dataclasses.replace`` and ``from_mapping``.
+    """
+    hints = typing.get_type_hints(cls, include_extras=True)
+    annotations = {}
+    for name in inspect.get_annotations(cls):
+        field = cls.__dict__.get(name)
+        metadata = field.metadata if isinstance(field, dataclasses.Field) else {}
+        hint = _checked(hints[name], metadata.get("low", -math.inf), metadata.get("high", math.inf))
+        if metadata.get("doc"):
+            hint = Annotated[hint, pydantic.Field(description=metadata["doc"])]
+        annotations[name] = hint
+    cls.__annotations__ = annotations
+    made: Any = pydantic.dataclasses.dataclass(frozen=True, config=_CONFIG)(cls)
+    validate = made.__init__
+    places = [f.name for f in dataclasses.fields(made) if f.init and not f.kw_only]
+
+    @functools.wraps(validate)
+    def __init__(self: Any, *args: Any, **values: Any) -> None:  # noqa: N807
+        if len(args) > len(places):
+            raise TypeError(f"{made.__name__} takes {len(places)} positional values")
+        for name, value in zip(places, args, strict=False):
+            if name in values:
+                raise TypeError(f"{made.__name__} got two values for '{name}'")
+            values[name] = value
+        try:
+            validate(self, **values)
+        except pydantic.ValidationError as error:
+            raise explained(error, made, values, made.__name__) from None
+
+    made.__init__ = __init__
+    return typing.cast(type[T], made)
+
+
 def from_mapping(cls: type[T], values: Mapping[str, Any] | None, where: str = "settings") -> T:
-    """Build the settings class from a mapping.
+    """Build a settings class from a mapping.
 
     Parameters
     ----------
-    cls: a dataclass; nested dataclass fields take nested mappings.
+    cls: made by ``settings``; nested settings take nested mappings.
     values: keys are field names; absent keys take the field's default.
     where: names the source in error messages, e.g. a file and a key path.
 
     Raises
     ------
-    SettingsError: unknown or missing key, wrong type, out of range; says what was expected.
+    SettingsError: unknown or missing key, wrong type, out of range; says what was expected. A
+        line for each thing that is wrong.
     """
+    if "__pydantic_validator__" not in vars(cls):
+        raise TypeError(f"{cls.__name__} is not made by @settings")
     if values is None:
         values = {}
     if not isinstance(values, Mapping):
         raise SettingsError(f"{where}: expected a mapping, got {values!r}")
-    fields = {f.name: f for f in dataclasses.fields(cls)}  # type: ignore[arg-type]
-    for key in values:
-        if key not in fields:
-            known = ", ".join(sorted(fields))
-            raise SettingsError(f"{where}: unknown key '{key}'; expected one of: {known}")
-    hints = typing.get_type_hints(cls)
-    arguments: dict[str, Any] = {}
-    for name, field in fields.items():
-        if name in values:
-            arguments[name] = convert(hints[name], values[name], f"{where}.{name}", field.metadata)
-        elif field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:
-            raise SettingsError(f"{where}: missing key '{name}' ({_type_name(hints[name])})")
     try:
-        return cls(**arguments)
-    except SettingsError as error:
-        raise SettingsError(f"{where}: {error}") from None
+        return pydantic.TypeAdapter(cls).validate_python(dict(values))
+    except pydantic.ValidationError as error:
+        raise explained(error, cls, values, where) from None
 
 
-def convert(hint: Any, value: Any, where: str, metadata: Mapping[str, Any] | None = None) -> Any:
-    """The value as the hinted type, checked against the bounds in the metadata."""
-    origin = typing.get_origin(hint)
-    if origin in (typing.Union, types.UnionType):
-        options = typing.get_args(hint)
-        if value is None and type(None) in options:
-            return None
-        rest = [o for o in options if o is not type(None)]
-        if len(rest) == 1:
-            return convert(rest[0], value, where, metadata)
-    if dataclasses.is_dataclass(hint) and isinstance(hint, type):
-        return value if isinstance(value, hint) else from_mapping(hint, value, where)
-    if origin is tuple:
-        return _convert_tuple(hint, value, where, metadata)
-    if origin is dict:
-        if not isinstance(value, Mapping):
-            raise SettingsError(f"{where}: expected a mapping, got {value!r}")
-        item = typing.get_args(hint)[1]
-        return {str(k): convert(item, v, f"{where}.{k}") for k, v in value.items()}
-    if hint is Any:
-        return value
-    if hint is float:
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise SettingsError(f"{where}: expected a number, got {value!r}")
-        value = float(value)
-        if math.isnan(value):
-            raise SettingsError(f"{where}: expected a number, got nan")
-        _check_range(value, where, metadata)
-        return value
-    if hint is int:
-        if isinstance(value, bool) or not isinstance(value, int):
-            raise SettingsError(f"{where}: expected a whole number, got {value!r}")
-        _check_range(value, where, metadata)
-        return value
+def _checked(hint: Any, low: float = -math.inf, high: float = math.inf) -> Any:
+    """The type with what pydantic shall check of it and of what is in it."""
+    origin, inner = typing.get_origin(hint), typing.get_args(hint)
+    if origin is Annotated:
+        return Annotated[_checked(inner[0], low, high), *inner[1:]]
+    if hint is float or hint is int:
+        checks: list[Any] = [Strict(), AllowInfNan(False)] if hint is float else [Strict()]
+        checks += [Ge(low)] if math.isfinite(low) else []
+        checks += [Le(high)] if math.isfinite(high) else []
+        return Annotated[hint, *checks]
     if hint is bool or hint is str:
-        if not isinstance(value, hint):
-            raise SettingsError(f"{where}: expected {_type_name(hint)}, got {value!r}")
-        return value
-    if origin is typing.Literal:
-        options = typing.get_args(hint)
-        if value not in options:
-            raise SettingsError(f"{where}: expected one of {list(options)}, got {value!r}")
-        return value
-    raise SettingsError(f"{where}: no conversion to {_type_name(hint)}")
+        return Annotated[hint, Strict()]
+    if origin is tuple:
+        many = len(inner) == 2 and inner[1] is Ellipsis
+        items = tuple(i if i is Ellipsis else _checked(i, low, high) for i in inner)
+        listed = functools.partial(_listed, None if many else len(inner))
+        return Annotated[tuple[items], BeforeValidator(listed)]  # type: ignore[valid-type]
+    if origin is dict:
+        return dict[str, _checked(inner[1], low, high)]  # type: ignore[misc]
+    if origin in (typing.Union, types.UnionType):
+        union: Any = typing.Union[tuple(_checked(i, low, high) for i in inner)]  # noqa: UP007
+        kinds = [i for i in inner if dataclasses.is_dataclass(i)]
+        return Annotated[union, pydantic.Field(discriminator="kind")] if len(kinds) > 1 else union
+    return hint
 
 
-def _convert_tuple(
-    hint: Any, value: Any, where: str, metadata: Mapping[str, Any] | None
-) -> tuple[Any, ...]:
-    if isinstance(value, str) or not isinstance(value, (list, tuple)):
-        raise SettingsError(f"{where}: expected a list, got {value!r}")
-    items = typing.get_args(hint)
-    if len(items) == 2 and items[1] is Ellipsis:
-        items = (items[0],) * len(value)
-    if len(items) != len(value):
-        raise SettingsError(f"{where}: expected {len(items)} values, got {len(value)}: {value!r}")
-    return tuple(
-        convert(item, v, f"{where}[{i}]", metadata)
-        for i, (item, v) in enumerate(zip(items, value, strict=True))
-    )
-
-
-def _check_range(value: float, where: str, metadata: Mapping[str, Any] | None) -> None:
-    low = (metadata or {}).get("low", -math.inf)
-    high = (metadata or {}).get("high", math.inf)
-    if not low <= value <= high:
-        raise SettingsError(f"{where}: {value} is out of range, expected [{low}, {high}]")
-
-
-def _type_name(hint: Any) -> str:
-    return getattr(hint, "__name__", str(hint))
+def _listed(count: int | None, value: Any) -> Any:
+    if not isinstance(value, (list, tuple)):
+        raise SettingsError(f"expected a list, got {value!r}")
+    if count is not None and len(value) != count:
+        raise SettingsError(f"expected {count} values, got {len(value)}: {value!r}")
+    return tuple(value)

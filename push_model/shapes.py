@@ -5,14 +5,12 @@ polygons with many vertices and have no sides to push on with a flat bumper.
 """
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from push_model.arrays import Array
-from push_model.settings import SettingsError, from_mapping
+from push_model.settings import SettingsError
 
 
 @dataclass(frozen=True)
@@ -104,6 +102,12 @@ class Shape:
         turn = edge[:, 0] * following[:, 1] - edge[:, 1] * following[:, 0]
         return bool((turn >= -1e-12).all())
 
+    def about(self, point: tuple[float, float]) -> "Shape":
+        """The same shape with its origin, the centre of mass, at a point [m] of this frame."""
+        outline = self.outline - np.array(point)
+        shape = Shape(self.kind, outline, ())
+        return replace(shape, sides=_sides(outline)) if self.sides else shape
+
     def dense_outline(self, spacing: float) -> Array:
         """``(m, 2)`` [m] points of the outline, vertices included, at most ``spacing`` apart."""
         return densified(self.outline, spacing)
@@ -141,9 +145,7 @@ def polygon(vertices: Array, kind: str = "polygon") -> Shape:
     if kind == "polygon" and _crosses_itself(points):
         raise SettingsError("a polygon's sides must not cross each other")
     outline = points - _centroid(points)
-    ends = np.roll(outline, -1, axis=0)
-    sides = tuple(Side(i, a, b) for i, (a, b) in enumerate(zip(outline, ends, strict=True)))
-    return Shape(kind, outline, sides)
+    return Shape(kind, outline, _sides(outline))
 
 
 def rectangle(length: float, width: float) -> Shape:
@@ -172,56 +174,9 @@ def flower(radius: float, amplitude: float, petals: int, vertices: int = 180) ->
     return Shape("flower", outline - _centroid(outline), ())
 
 
-@dataclass(frozen=True)
-class _Polygon:
-    vertices: tuple[tuple[float, float], ...]
-
-
-@dataclass(frozen=True)
-class _Rectangle:
-    length: float
-    width: float
-
-
-@dataclass(frozen=True)
-class _Ellipse:
-    semi_axis_x: float
-    semi_axis_y: float
-
-
-@dataclass(frozen=True)
-class _Flower:
-    radius: float
-    amplitude: float
-    petals: int
-
-
-def shape_from_mapping(values: Mapping[str, Any], where: str = "shape") -> Shape:
-    """A shape from YAML: one key, ``polygon``, ``rectangle``, ``ellipse`` or ``flower``.
-
-    Example: ``{rectangle: {length: 0.09, width: 0.09}}``.
-    """
-    kinds: dict[str, Any] = {
-        "polygon": _Polygon,
-        "rectangle": _Rectangle,
-        "ellipse": _Ellipse,
-        "flower": _Flower,
-    }
-    if not isinstance(values, Mapping) or len(values) != 1 or next(iter(values)) not in kinds:
-        raise SettingsError(f"{where}: expected one key of {sorted(kinds)}, got {values!r}")
-    ((kind, inner),) = values.items()
-    spec = from_mapping(kinds[kind], inner, f"{where}.{kind}")
-    try:
-        if isinstance(spec, _Polygon):
-            return polygon(np.array(spec.vertices))
-        if isinstance(spec, _Flower):
-            return flower(spec.radius, spec.amplitude, spec.petals)
-        sizes = [float(v) for v in vars(spec).values()]
-        if not all(0.0 < v < math.inf for v in sizes):
-            raise SettingsError(f"sizes must be positive, got {sizes}")
-        return (rectangle if isinstance(spec, _Rectangle) else ellipse)(sizes[0], sizes[1])
-    except SettingsError as error:
-        raise SettingsError(f"{where}.{kind}: {error}") from None
+def _sides(outline: Array) -> tuple[Side, ...]:
+    ends = np.roll(outline, -1, axis=0)
+    return tuple(Side(i, a, b) for i, (a, b) in enumerate(zip(outline, ends, strict=True)))
 
 
 def _area(points: Array) -> float:

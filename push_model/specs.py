@@ -1,89 +1,200 @@
 """What a robot, an object and an environment are: the typed contents of the files in config/."""
 
 import math
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
 from push_model.arrays import Array
+from push_model.bumpers import Bumper, FlatBumper
+from push_model.drives import Drive, SpeedDrive, TorqueDrive
 from push_model.kinematics import DifferentialDrive
 from push_model.limit_surface import GRAVITY, EllipsoidLimitSurface, uniform_pressure_radius
-from push_model.settings import SettingsError, bounded
-from push_model.shapes import Shape, shape_from_mapping
+from push_model.outlines import convex_hull, inside_convex
+from push_model.se2 import compose, pose
+from push_model.settings import SettingsError, bounded, settings
+from push_model.shape_specs import ShapeSpec
+from push_model.shapes import Shape, polygon
 
 
-@dataclass(frozen=True)
-class BumperSpec:
-    """What a robot pushes with."""
-
-    kind: Literal["flat"]
-    width: float = bounded(low=1e-3, high=2.0, doc="[m] of the flat face")
-    distance: float = bounded(low=1e-3, high=2.0, doc="[m] D, axle to face")
-    height: float = bounded(0.006, low=1e-3, high=1.0, doc="[m] of the face, at axle height")
-
-
-@dataclass(frozen=True)
+@settings
 class RobotSpec:
-    """A differential-drive robot type."""
+    """A robot type: a round body, what moves it, and what it pushes with.
 
-    wheel_radius: float = bounded(low=1e-3, high=1.0, doc="[m]")
-    half_track: float = bounded(low=1e-3, high=1.0, doc="[m] half the wheel distance")
-    max_wheel_speed: float = bounded(low=1e-2, high=100.0, doc="[rad/s]")
+    Its frame is at the axle midpoint, x ahead; that of a holonomic one is in the middle. What is
+    left out is filled in when it is built: the height of the bumper's middle (the axle's; half
+    the body's without wheels) and the casters (before and behind; none without wheels).
+    """
+
+    drive: Drive
+    bumper: Bumper
     body_radius: float = bounded(low=1e-3, high=2.0, doc="[m]")
     body_height: float = bounded(low=1e-3, high=2.0, doc="[m]")
     mass: float = bounded(low=1e-3, high=500.0, doc="[kg] in all")
-    wheel_mass: float = bounded(low=1e-4, high=50.0, doc="[kg] of one wheel")
-    wheel_torque: float = bounded(low=1e-4, high=100.0, doc="[Nm] greatest motor torque")
-    wheel_friction: float = bounded(1.0, low=0.0, high=3.0, doc="wheel on floor")
-    bumper: BumperSpec = field(default_factory=lambda: BumperSpec("flat", 0.07, 0.05))
+    com_ahead: float = bounded(
+        0.0, low=-2.0, high=2.0, doc="[m] d, centre of mass of the body, ahead of the axle"
+    )
+    inertia: float | None = bounded(
+        None,
+        low=1e-9,
+        high=1000.0,
+        doc="[kg m^2] I_r about the vertical through the centre of mass",
+    )
+    casters: tuple[float, ...] | None = bounded(
+        None, low=-2.0, high=2.0, doc="[m] x of each, ahead of the axle"
+    )
+    caster_clearance: float = bounded(
+        2e-4, low=0.0, high=0.1, doc="[m] of casters above the floor at rest"
+    )
+
+    def __post_init__(self) -> None:
+        axle = self.drive.wheel_radius if isinstance(self.drive, DifferentialDrive) else None
+        if self.bumper.z is None:
+            z = self.body_height / 2.0 if axle is None else axle
+            object.__setattr__(self, "bumper", replace(self.bumper, z=z))
+        if self.casters is None:
+            span = 0.75 * self.body_radius
+            object.__setattr__(self, "casters", () if axle is None else (span, -span))
+        if abs(self.com_ahead) >= self.body_radius:
+            raise SettingsError(
+                f"com_ahead {self.com_ahead} lies outside the body_radius {self.body_radius}"
+            )
+        if isinstance(self.drive, SpeedDrive | TorqueDrive):
+            wheels = 2.0 * self.drive.wheel_mass
+            if wheels >= self.mass:
+                raise SettingsError(f"mass {self.mass} must be more than its wheels', {wheels}")
 
     @property
-    def drive(self) -> DifferentialDrive:
-        """Its kinematics."""
-        return DifferentialDrive(self.wheel_radius, self.half_track, self.max_wheel_speed)
+    def kinematics(self) -> DifferentialDrive | None:
+        """Of its two wheels; None when it moves in any direction."""
+        return self.drive if isinstance(self.drive, DifferentialDrive) else None
+
+    @property
+    def differential(self) -> DifferentialDrive:
+        """Kinematics of its two wheels, for what can do nothing else.
+
+        Raises
+        ------
+        SettingsError: it has no wheels.
+        """
+        if not isinstance(self.drive, DifferentialDrive):
+            raise SettingsError(
+                f"a robot with two driven wheels is needed, its drive is '{self.drive.kind}'"
+            )
+        return self.drive
+
+    @property
+    def flat_bumper(self) -> FlatBumper:
+        """Its bumper, for what can push with nothing but a flat one.
+
+        Raises
+        ------
+        SettingsError: it is not flat.
+        """
+        if not isinstance(self.bumper, FlatBumper):
+            raise SettingsError(f"a flat bumper is needed, the robot's is a '{self.bumper.kind}'")
+        return self.bumper
+
+    @property
+    def max_speed(self) -> float:
+        """[m/s]."""
+        return self.drive.max_speed
+
+    @property
+    def max_turn_rate(self) -> float:
+        """[rad/s] on the spot."""
+        return self.drive.max_turn_rate
+
+    @property
+    def push_distance(self) -> float:
+        """[m] D, from the axle midpoint forward to where the bumper touches."""
+        return self.bumper.distance
+
+    @property
+    def bumper_z(self) -> float:
+        """[m] of the bumper's middle above the floor."""
+        assert self.bumper.z is not None  # filled in when it was built
+        return self.bumper.z
+
+    @property
+    def lever(self) -> float:
+        """[m] from the frame to what moves it: a turn of 1 rad moves that so far."""
+        return self.body_radius if self.kinematics is None else self.kinematics.half_track
 
     @property
     def footprint_radius(self) -> float:
         """[m] of the circle about the axle midpoint that holds body and bumper."""
-        corner = math.hypot(self.bumper.distance, self.bumper.width / 2.0)
-        return max(self.body_radius, corner)
+        return max(self.body_radius, self.bumper.reach)
 
     @property
     def outline(self) -> Array:
         """``(n, 2)`` [m] convex outline of body and bumper in the robot frame."""
-        angle = np.linspace(math.pi / 2.0, 1.5 * math.pi, 13)
-        back = self.body_radius * np.column_stack([np.cos(angle), np.sin(angle)])
-        d, w = self.bumper.distance, self.bumper.width / 2.0
-        return np.vstack([back, [[d, -w], [d, w]]])
+        return self.bumper.outline(self.body_radius)
 
 
-@dataclass(frozen=True)
+@settings
 class ObjectSpec:
-    """A pushable object."""
+    """A pushable object.
 
-    shape: dict[str, Any]
+    Two frames: the *geometric* one has its origin in the centroid of the outline's area. Motion
+    capture sees it, and poses in files, on topics and of goals are its poses. Mechanics works about
+    the centre of mass, ``com`` in the geometric frame, with parallel axes: ``geometry`` and
+    ``limit_surface`` are given there; ``mass_pose`` and ``geometric_pose`` convert.
+    The two are the same when ``com`` is (0, 0).
+    """
+
+    shape: ShapeSpec
     mass: float = bounded(low=1e-3, high=500.0, doc="[kg]")
     height: float = bounded(low=5e-3, high=2.0, doc="[m]")
     floor_friction: float = bounded(low=0.01, high=2.0, doc="object on floor")
     contact_friction: float = bounded(low=0.0, high=2.0, doc="robot on object")
     feet: int = bounded(4, low=3, high=16, doc="number of soft feet, see docs/physics.md")
+    com: tuple[float, float] = bounded(
+        (0.0, 0.0), low=-100.0, high=100.0, doc="[m] centre of mass in the geometric frame"
+    )
+    inertia: float | None = bounded(
+        None, low=1e-9, high=1e6, doc="[kg m^2] about the centre of mass; by default uniform"
+    )
 
     def __post_init__(self) -> None:
-        shape_from_mapping(self.shape)
+        if not inside_convex(convex_hull(self.outline), np.array([self.com]))[0]:
+            raise SettingsError(f"com {self.com} must lie within the object, which else tips over")
+
+    @cached_property
+    def geometry(self) -> Shape:
+        """The shape about the centre of mass."""
+        shape = self.shape.shape()
+        return shape if self.com == (0.0, 0.0) else shape.about(self.com)
 
     @property
-    def geometry(self) -> Shape:
-        """The shape."""
-        return shape_from_mapping(self.shape)
+    def outline(self) -> Array:
+        """``(n, 2)`` [m] in the geometric frame."""
+        return self.shape.shape().outline
+
+    @property
+    def moment(self) -> float:
+        """[kg m^2] about the vertical through the centre of mass."""
+        if self.inertia is not None:
+            return self.inertia
+        return self.mass * self.geometry.inertia_per_mass
+
+    def mass_pose(self, geometric: Array) -> Array:
+        """Pose ``(3,)`` of the centre of mass when the geometric frame is there."""
+        return geometric if self.com == (0.0, 0.0) else compose(geometric, pose(*self.com, 0.0))
+
+    def geometric_pose(self, mass: Array) -> Array:
+        """Pose ``(3,)`` of the geometric frame when the centre of mass is there."""
+        x, y = self.com
+        return mass if self.com == (0.0, 0.0) else compose(mass, pose(-x, -y, 0.0))
 
     def limit_surface(self) -> EllipsoidLimitSurface:
-        """Ellipsoid with the force and pure-spin torque of uniform pressure."""
+        """Ellipsoid about the centre of mass, with force and spin torque of uniform pressure."""
         force = self.floor_friction * self.mass * GRAVITY
         return EllipsoidLimitSurface(force, force * uniform_pressure_radius(self.geometry))
 
 
-@dataclass(frozen=True)
+@settings
 class BoxSpec:
     """A box-shaped obstacle."""
 
@@ -96,7 +207,7 @@ class BoxSpec:
             raise SettingsError(f"size must be positive, got {self.size}")
 
 
-@dataclass(frozen=True)
+@settings
 class CircleSpec:
     """A round obstacle."""
 
@@ -104,14 +215,14 @@ class CircleSpec:
     radius: float = bounded(low=1e-3, high=100.0, doc="[m]")
 
 
-@dataclass(frozen=True)
+@settings
 class PolygonSpec:
     """A convex polygonal obstacle."""
 
     vertices: tuple[tuple[float, float], ...]
 
 
-@dataclass(frozen=True)
+@settings
 class EnvironmentSpec:
     """An arena centred on the origin with walls all round and obstacles inside."""
 
@@ -129,5 +240,5 @@ class EnvironmentSpec:
         if self.size[0] * self.size[1] / self.resolution**2 > 4e6:
             raise SettingsError("the grid would have over four million cells; coarsen resolution")
         for p in self.polygons:
-            if not shape_from_mapping({"polygon": {"vertices": p.vertices}}).convex:
+            if not polygon(np.array(p.vertices)).convex:
                 raise SettingsError("an obstacle polygon must be convex; split it")

@@ -1,14 +1,16 @@
 """The controller node: follows trajectories with the LTV-MPC, driven by the pose stream."""
 
 import math
-import time
 from typing import Any
 
+import numpy as np
 from geometry_msgs.msg import TwistStamped
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from std_msgs.msg import Header
 
+from push_estimation.pose_gate import PoseGateSettings, Stamp
+from push_model.arrays import Array
 from push_model.kinematics import unicycle_step
 from push_model.settings import SettingsError
 from push_mpc import (
@@ -20,35 +22,41 @@ from push_mpc import (
     controller_kind,
 )
 from push_msgs.action import FollowTrajectory
-from push_msgs.msg import ControllerStatus, NamedPoses
+from push_msgs.msg import ControllerStatus
 from push_ros.actions import GoalServer
 from push_ros.conversions import (
     circles_from_ros,
     limits_from_ros,
-    time_from_ros,
     trajectory_from_ros,
     twist_to_ros,
 )
 from push_ros.diagnostics import Diagnostics
+from push_ros.heartbeat import HeartbeatWatch
+from push_ros.names import inside, names_of_robot
 from push_ros.parameters import declare_settings
-from push_ros.pose_tracker import PoseTracker, PoseTrackerSettings, Stamp
-from push_ros.qos import COMMAND, STATUS, STREAM
-from push_ros.scenario import Scenario, load_scenario
+from push_ros.pose_feed import Frame, PoseFeed
+from push_ros.qos import COMMAND, STATUS
 from push_ros.validation import FRAME, InvalidMessage, check_frame, finite, planar_pose
+from push_scenario.scenario import Scenario, load_scenario
 
 _GIVE_UP = 5.0  # [s] without poses until a task is given up
-_AHEAD = 1.0  # [s] that a heartbeat's stamp may lie ahead of the poses
+_TICK = 0.01  # [s] assumed where the time since the last frame is not known
+_FEEDBACK_EVERY = 10  # frames
 
 
 class ControllerNode(Node):
     """Answers every frame of the pose stream with a command, zero when it has no task."""
 
-    def __init__(self, scenario: Scenario | None = None, robot: str = "") -> None:
-        super().__init__("controller")
+    def __init__(
+        self, scenario: Scenario | None = None, robot: str = "", namespace: str = ""
+    ) -> None:
+        """namespace: the world's; the node lives in its robot's below it."""
+        super().__init__("controller", namespace=inside(namespace, robot))
         name = self.declare_parameter("scenario", "env1-target1").value
         robot = str(self.declare_parameter("robot", robot).value)
         self._scenario = scenario or load_scenario(str(name))
         self.robot, spec = self._scenario.robot(robot)
+        names = names_of_robot(self, self.robot)
         values = dict(self._scenario.parameters.get("controller", {}))
         sections = {k: values.pop(k, {}) for k in ("mpc", "tracker", "poses")}
         default = str(values.pop("controller", "ltv"))
@@ -57,7 +65,7 @@ class ControllerNode(Node):
                 f"controller: unknown key '{next(iter(values))}'; expected controller, mpc, "
                 "tracker or poses"
             )
-        self._drive = spec.drive
+        self._drive = spec.differential
         self._kind = controller_kind(str(self.declare_parameter("controller", default).value))
         self._mpc_settings = declare_settings(
             self, self._kind.settings, sections["mpc"], "mpc", "controller.mpc", self._apply_mpc
@@ -71,45 +79,41 @@ class ControllerNode(Node):
             self._apply_tracker,
         )
         self._rebuild()
-        self._poses = PoseTracker(
-            declare_settings(
-                self, PoseTrackerSettings, sections["poses"], "poses", "controller.poses"
-            )
+        poses = declare_settings(
+            self, PoseGateSettings, sections["poses"], "poses", "controller.poses"
         )
+        self._others = {  # [m] least distance of the axle midpoint to the middle of each body
+            other: spec.body_radius + radius
+            for other, radius in self._scenario.radii.items()
+            if other != self.robot
+        }
         self._object = ""
-        self._heartbeat = self._heartbeat_wall = 0.0
-        self._heartbeat_timeout = 0.0
+        self._pushing = False
         self._held = 0.0  # [s] without a pose that this task needs
         self._ticks = 0
-        self._last_wall = time.monotonic()
         self._last_stamp = Header().stamp
         self._reason = "no task"
         self._mode = ControllerStatus.IDLE
-        self._diagnostics = Diagnostics(self, self._state)
-        topic = f"/{self.robot}/cmd_vel"
+        self._diagnostics = Diagnostics(self, names, self._state)
+        topic = names.robot(self.robot, "cmd_vel")
         self._command_publisher = self.create_publisher(
             TwistStamped, topic, COMMAND, event_callbacks=self._diagnostics.publisher_events(topic)
         )
         self._status_publisher = self.create_publisher(
-            ControllerStatus, "/controller/status", STATUS
+            ControllerStatus, names.robot(self.robot, "controller/status"), STATUS
         )
         self._server = GoalServer(
             self,
             FollowTrajectory,
-            f"/{self.robot}/follow_trajectory",
+            names.robot(self.robot, "follow_trajectory"),
             check=self._parse,
             start=self._begin,
             cancel=self._canceled,
-            preempt=self._preempt,
+            preempt=lambda request: self._preempt(),
         )
-        self.create_subscription(Header, f"/{self.robot}/heartbeat", self._on_heartbeat, STREAM)
-        self.create_subscription(
-            NamedPoses,
-            "/poses",
-            self._on_poses,
-            STREAM,
-            event_callbacks=self._diagnostics.subscription_events("/poses"),
-        )
+        bodies = {self.robot, *self._scenario.objects, *self._others}
+        self._poses = PoseFeed(self, names, poses, bodies, self._diagnostics, self._on_frame)
+        self._heartbeat = HeartbeatWatch(self, names, self.robot, self._poses, self._diagnostics)
         self._watchdog = self.create_timer(
             0.05, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
@@ -144,9 +148,11 @@ class ControllerNode(Node):
         tolerances = (request.position_tolerance, request.orientation_tolerance)
         finite(tolerances, "a tolerance")
         push = None
+        if request.object and request.object not in self._scenario.objects:
+            raise InvalidMessage(f"unknown object '{request.object}'")
         if request.mode == FollowTrajectory.Goal.PUSH:
-            if request.object not in self._scenario.objects:
-                raise InvalidMessage(f"unknown object '{request.object}'")
+            if not request.object:
+                raise InvalidMessage("a push needs its object")
             push = Push(planar_pose(request.contact, "the contact"), limits_from_ros(request))
         elif request.mode != FollowTrajectory.Goal.MOVE:
             raise InvalidMessage(f"unknown mode {request.mode}")
@@ -162,9 +168,9 @@ class ControllerNode(Node):
         ), float(request.heartbeat_timeout)
 
     def _begin(self, request: Any) -> None:
-        task, self._heartbeat_timeout = self._parse(request)
-        self._object = request.object if task.push is not None else ""
-        self._heartbeat, self._heartbeat_wall = self._poses.stamp, time.monotonic()
+        task, heartbeat_timeout = self._parse(request)
+        self._object, self._pushing = request.object, task.push is not None
+        self._heartbeat.begin(heartbeat_timeout)
         self._held = 0.0
         self.tracker.start(task)
         self._mode = ControllerStatus.PUSH if task.push else ControllerStatus.MOVE
@@ -191,87 +197,50 @@ class ControllerNode(Node):
             result.orientation_error = tick.orientation_error
         return result
 
-    def _on_heartbeat(self, message: Header) -> None:
-        stamp = time_from_ros(message.stamp)
-        if stamp > self._poses.stamp + _AHEAD:
-            self._diagnostics.refuse(f"/{self.robot}/heartbeat", "its stamp lies in the future")
+    def _on_frame(self, frame: Frame) -> None:
+        self._last_stamp = frame.stamp
+        if frame.verdict is Stamp.REFUSED:
+            self._publish_command(0.0, 0.0)  # whatever time it is: stand still
             return
-        self._heartbeat, self._heartbeat_wall = max(self._heartbeat, stamp), time.monotonic()
-
-    def _on_poses(self, message: NamedPoses) -> None:
-        if message.header.frame_id != FRAME:
-            self._diagnostics.refuse("/poses", f"frame '{message.header.frame_id}'")
-            return
-        before = self._poses.stamp
-        verdict = self._poses.begin(time_from_ros(message.header.stamp))
-        if verdict is Stamp.REFUSED:
-            self._diagnostics.refuse("/poses", "its stamp is zero or not newer than the last")
-            return
-        self._last_wall = time.monotonic()
-        self._last_stamp = message.header.stamp
-        seen = set()
-        for named in message.poses:
-            try:
-                if self._poses.accept(named.name, planar_pose(named.pose, named.name)):
-                    seen.add(named.name)
-            except InvalidMessage as error:
-                self._poses.refused += 1
-                self._diagnostics.refuse("/poses", str(error))
-        if verdict is Stamp.RESET:
-            self._heartbeat = 0.0
+        if frame.verdict is Stamp.RESET:
+            self._heartbeat.reset()
             if self.tracker.active:
                 self._end(FollowTrajectory.Result.CLOCK_RESET, "the clock went back")
-        if verdict is Stamp.RESUMED:
+        if frame.verdict is Stamp.RESUMED:
             self.tracker.halt()
-        dt = self._poses.stamp - before if verdict is Stamp.OK and before > 0.0 else 0.01
-        self._step(dt, seen)
+        self._step(frame.elapsed or _TICK, frame.seen)
 
-    def _step(self, dt: float, seen: set[str]) -> None:
+    def _step(self, dt: float, seen: frozenset[str]) -> None:
         tracker = self.tracker
+        if tracker.active and self._heartbeat.lost:
+            self._end(FollowTrajectory.Result.PREEMPTED, "the supervisor is gone")
         if not tracker.active:
             self._publish_command(0.0, 0.0)
             self._publish_status(None)
             return
-        if 0.0 < self._heartbeat_timeout < self._silence_of_supervisor():
-            self._end(FollowTrajectory.Result.PREEMPTED, "the supervisor is gone")
-            self._publish_command(0.0, 0.0)
-            self._publish_status(None)
-            return
+        self._ticks += 1
         robot = self._poses.pose(self.robot)
-        item = self._poses.pose(self._object) if self._object else None
-        if robot is None or (self._object and item is None):
-            tracker.halt()
-            self._mode = ControllerStatus.HOLD
-            self._reason = f"no valid pose of {self.robot if robot is None else self._object}"
-            self._held += dt
-            if self._held > _GIVE_UP:
-                self._end(
-                    FollowTrajectory.Result.POSES_STALE, f"{self._reason} for {_GIVE_UP:.0f} s"
-                )
-            self._ticks += 1
-            if self._ticks % 10 == 0:
-                self._server.feedback(FollowTrajectory.Feedback())
-            self._publish_command(0.0, 0.0)
-            self._publish_status(None)
+        item = self._poses.pose(self._object) if self._pushing else None
+        if robot is None or (self._pushing and item is None):
+            self._hold(dt, self.robot if robot is None else self._object)
             return
         self._held = 0.0
-        age = self._poses.age(self.robot)
+        age = self._poses.gate.age(self.robot)
         if age > 0.0:  # dead reckoning over a drop-out
             robot = unicycle_step(robot, tracker.v, tracker.omega, age)
-        tick = tracker.tick(dt, robot, item if self._object in seen else None)
+        tick = tracker.tick(dt, robot, item if self._object in seen else None, self._bodies())
         self._publish_command(tick.v, tick.omega)
         failed = tick.solve is not None and not tick.solve.solved
         self._mode = (
             ControllerStatus.FALLBACK
             if failed
-            else (ControllerStatus.PUSH if self._object else ControllerStatus.MOVE)
+            else (ControllerStatus.PUSH if self._pushing else ControllerStatus.MOVE)
         )
         self._reason = tick.solve.reason if failed and tick.solve else "following a trajectory"
         self._publish_status(tick)
-        self._ticks += 1
         if tick.finished:
             self._end(int(tick.code), tick.message, tick)
-        elif self._ticks % 10 == 0:
+        elif self._ticks % _FEEDBACK_EVERY == 0:
             self._server.feedback(
                 FollowTrajectory.Feedback(
                     progress=tick.progress,
@@ -280,13 +249,28 @@ class ControllerNode(Node):
                 )
             )
 
-    def _silence_of_supervisor(self) -> float:
-        """[s] since its last heartbeat, in pose time or wall time, whichever is less.
+    def _hold(self, dt: float, missing: str) -> None:
+        """Stand still while a pose that the task needs is missing; give up after a while."""
+        self.tracker.halt()
+        self._mode = ControllerStatus.HOLD
+        self._reason = f"no valid pose of {missing}"
+        self._held += dt
+        if self._held > _GIVE_UP:
+            why = f"{self._reason} for {_GIVE_UP:.0f} s"
+            self._end(FollowTrajectory.Result.POSES_STALE, why)
+        if self._ticks % _FEEDBACK_EVERY == 0:
+            self._server.feedback(FollowTrajectory.Feedback())
+        self._publish_command(0.0, 0.0)
+        self._publish_status(None)
 
-        Pose time alone runs fast in a simulation that does; wall time alone runs on in a pause.
-        """
-        wall = time.monotonic() - self._heartbeat_wall
-        return min(self._poses.stamp - self._heartbeat, wall)
+    def _bodies(self) -> Array:
+        """Other bodies to keep away from ``(n, 3)``: x, y, least distance of the axle midpoint."""
+        rows = []
+        for name, reach in self._others.items():
+            pose = None if name == self._object else self._poses.pose(name)
+            if pose is not None:
+                rows.append((pose[0], pose[1], reach))
+        return np.array(rows, dtype=np.float64).reshape(-1, 3)
 
     def _publish_command(self, v: float, omega: float) -> None:
         if not (math.isfinite(v) and math.isfinite(omega)):
@@ -324,8 +308,8 @@ class ControllerNode(Node):
 
     def _on_watchdog(self) -> None:
         """Wall time: the pose stream may be dead, and with it every other clock."""
-        silence = time.monotonic() - self._last_wall
-        if not self.tracker.active or silence < 2.0 * self._poses.settings.timeout:
+        silence = self._poses.silence
+        if not self.tracker.active or silence < 2.0 * self._poses.gate.settings.timeout:
             return
         self.tracker.halt()
         self._publish_command(0.0, 0.0)
@@ -337,13 +321,13 @@ class ControllerNode(Node):
         self._publish_command(0.0, 0.0)
 
     def _state(self) -> dict[str, Any]:
-        stale = self.tracker.active and time.monotonic() - self._last_wall > 0.3
+        stale = self.tracker.active and self._poses.silence > 0.3
         return {
             "mode": self._mode,
             "reason": self._reason,
             "solves": self.tracker.solves,
             "failures": self.tracker.failures,
-            "poses refused": self._poses.refused,
-            "pose jumps": self._poses.jumps,
+            "poses refused": self._poses.gate.refused,
+            "pose jumps": self._poses.gate.jumps,
             "warning": "poses are stale" if stale else "",
         }

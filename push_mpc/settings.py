@@ -1,12 +1,11 @@
 """Settings of the LTV-MPC and of the trajectory tracker around it."""
 
-from dataclasses import dataclass
 from typing import Literal
 
-from push_model.settings import SettingsError, bounded
+from push_model.settings import SettingsError, bounded, settings
 
 
-@dataclass(frozen=True)
+@settings
 class MpcSettings:
     """Names follow section 2.4.5."""
 
@@ -35,7 +34,7 @@ class MpcSettings:
             raise SettingsError("input_weight must be positive: without it there are many optima")
 
 
-@dataclass(frozen=True)
+@settings
 class TrackerSettings:
     """When a trajectory is done, and when it has gone wrong."""
 

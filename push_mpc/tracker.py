@@ -24,6 +24,7 @@ from push_mpc.reference_clock import ReferenceClock
 from push_mpc.settings import TrackerSettings
 from push_mpc.task import Task, Tick, TrackError
 
+_NO_CIRCLES = np.zeros((0, 3))
 _REACH = 1.5  # of the way that the horizon covers at full speed: nothing farther can bind
 _MOVING = 1e-3  # [m/s]: slower than that, omega / v is no curvature but noise
 
@@ -91,17 +92,22 @@ class TrajectoryTracker:
         """Command zero and keep the task."""
         self._command.stop()
 
-    def tick(self, dt: float, robot: Array, item: Array | None) -> Tick:
+    def tick(
+        self, dt: float, robot: Array, item: Array | None, others: Array = _NO_CIRCLES
+    ) -> Tick:
         """One control tick.
 
         Parameters
         ----------
         dt: [s] since the previous tick.
         robot, item: measured poses ``(3,)``; item only matters in a push.
+        others: ``(n, 3)`` moving obstacles where they are now, beside the task's circles.
         """
         task = self._task
         if task is None:
             raise RuntimeError("tick without a task")
+        if len(others):
+            task = replace(task, circles=np.vstack([task.circles, others]))
         robot = self._without_delay(robot, dt)
         grasp, limits = self._grasp, None
         if grasp is not None and item is not None:

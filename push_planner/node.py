@@ -34,10 +34,11 @@ from push_ros.conversions import (
     trajectory_to_ros,
 )
 from push_ros.diagnostics import Diagnostics
+from push_ros.names import names_of
 from push_ros.parameters import declare_settings
 from push_ros.qos import LATCHED
-from push_ros.scenario import Scenario, load_scenario
 from push_ros.validation import FRAME, InvalidMessage, planar_pose
+from push_scenario.scenario import Scenario, load_scenario
 
 _SIGN_OF_LIFE = 0.5  # [s] wall time between feedback messages at most
 _MAP_PATIENCE = 5.0  # [s] wall time that a request waits for the first map
@@ -46,8 +47,12 @@ _MAP_PATIENCE = 5.0  # [s] wall time that a request waits for the first map
 class PlannerNode(Node):
     """Plans in slices between which its executor serves others, so that a goal can be cancelled."""
 
-    def __init__(self, scenario: Scenario | None = None) -> None:
-        super().__init__("planner")
+    def __init__(
+        self, scenario: Scenario | None = None, namespace: str = "", world: str = ""
+    ) -> None:
+        """namespace: the team's; world: the bridge's, where it is another one."""
+        super().__init__("planner", namespace=namespace)
+        names = names_of(self, world)
         name = self.declare_parameter("scenario", "env1-target1").value
         self._scenario = scenario or load_scenario(str(name))
         self.settings = declare_settings(
@@ -64,26 +69,26 @@ class PlannerNode(Node):
         self._pending = False
         self.plans = self.failures = 0
         self.last_time = 0.0
-        self._diagnostics = Diagnostics(self, self._state)
-        self._plan_publisher = self.create_publisher(PlanMessage, "/push_plan", LATCHED)
-        self._path_publisher = self.create_publisher(Path, "/push_path", LATCHED)
+        self._diagnostics = Diagnostics(self, names, self._state)
+        self._plan_publisher = self.create_publisher(PlanMessage, names.team("push_plan"), LATCHED)
+        self._path_publisher = self.create_publisher(Path, names.team("push_path"), LATCHED)
         self.create_subscription(
             OccupancyGrid,
-            "/map",
+            names.world("map"),
             self._on_map,
             LATCHED,
-            event_callbacks=self._diagnostics.subscription_events("/map"),
+            event_callbacks=self._diagnostics.subscription_events(names.world("map")),
         )
         self._server = GoalServer(
             self,
             PlanPush,
-            "/plan_push",
+            names.team("plan_push"),
             check=lambda request: None,
             start=self._begin,
             cancel=self._canceled,
-            preempt=self._preempt,
+            preempt=lambda request: self._preempt(),
         )
-        self.create_service(PlanRobotPath, "/plan_robot_path", self._on_robot_path)
+        self.create_service(PlanRobotPath, names.team("plan_robot_path"), self._on_robot_path)
         self._watchdog = self.create_timer(
             0.5, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
@@ -237,7 +242,7 @@ class PlannerNode(Node):
             if self._grid is None:
                 raise NoRobotPath(response.NO_MAP, "no map has been received on /map")
             start, goal = planar_pose(request.start, "start"), planar_pose(request.goal, "goal")
-            planner = self._planner("", "")
+            planner = self._planner(request.robot, "")
             trajectory = plan_robot_path(
                 planner.scene.field,
                 planner.scene.robot,

@@ -209,7 +209,7 @@ class PushPlanner:
             points,
             heading,
             curvature,
-            self.scene.robot.drive,
+            self.scene.robot.differential,
             self.settings.push_speed,
             self.settings.push_acceleration,
         )

@@ -84,10 +84,10 @@ def push_sides(robot: RobotSpec, item: ObjectSpec, friction_trust: float) -> tup
     surface = item.limit_surface()
     sides = []
     for side in item.geometry.sides:
-        contact = contact_on_side(side, robot.bumper.width)
-        limits = curvature_limits(contact, robot.bumper.distance, item.contact_friction, surface)
+        contact = contact_on_side(side, robot.flat_bumper.width)
+        limits = curvature_limits(contact, robot.push_distance, item.contact_friction, surface)
         if limits is not None:
-            grasp = contact.object_pose + np.array([robot.bumper.distance, 0.0, 0.0])
+            grasp = contact.object_pose + np.array([robot.push_distance, 0.0, 0.0])
             sides.append(
                 PushSide(side.index, contact, limits, limits.scaled(friction_trust), grasp)
             )

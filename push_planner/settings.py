@@ -1,11 +1,9 @@
 """Settings of the two-layer push planner."""
 
-from dataclasses import dataclass
-
-from push_model.settings import SettingsError, bounded
+from push_model.settings import SettingsError, bounded, settings
 
 
-@dataclass(frozen=True)
+@settings
 class PlannerSettings:
     """Names follow section 2.2; lengths in [m], angles in [rad]."""
 

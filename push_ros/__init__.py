@@ -1,4 +1,2 @@
-"""What nodes share: QoS, validation, conversion, parameters, diagnostics, actions, start and stop.
-
-Only ``scenario`` and ``pose_tracker`` may be imported without ROS.
-"""
+"""What nodes share: names, QoS, validation, conversion, parameters, diagnostics, actions, poses,
+goals, start and stop."""

@@ -28,8 +28,9 @@ class GoalServer:
     check: raises an exception whose text is logged when the goal must be rejected.
     refuse: result for a goal that is accepted only to be told why it cannot be; None where it can.
     A goal that is rejected or refused leaves the one under way alone.
-    preempt: called before a new goal is taken; the owner ends what is under way, whoever asked for
-    it, and a goal of this server with ``finish``. start: called with the new goal's request.
+    preempt: called with the new goal's request before it is taken; the owner ends what is under
+    way, whoever asked for it, and a goal of this server with ``finish``.
+    start: called with the new goal's request.
     cancel: called when the goal under way shall end; the owner answers with ``finish``.
     """
 
@@ -42,7 +43,7 @@ class GoalServer:
         check: Callable[[Any], None],
         start: Callable[[Any], None],
         cancel: Callable[[], None],
-        preempt: Callable[[], None],
+        preempt: Callable[[Any], None],
         refuse: Callable[[Any], Any] = lambda request: None,
     ) -> None:
         self._node = node
@@ -79,7 +80,7 @@ class GoalServer:
         if refusal is not None:
             self._server.deliver(handle, lambda h: self._deliver(h, refusal, False))
             return
-        self._preempt()
+        self._preempt(handle.request)
         self._handle = handle
         self._start(handle.request)
 

@@ -1,6 +1,8 @@
 """Between messages and the project's types: ``x_to_ros`` and ``x_from_ros``, free functions."""
 
 import array
+import math
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,12 +17,12 @@ from push_model.occupancy import OccupancyGrid
 from push_model.push_segment import PushSegment
 from push_model.stable_push import CurvatureLimits
 from push_model.trajectory import Trajectory
-from push_msgs.msg import Circle
+from push_msgs.msg import Circle, Contacts, Poses
 from push_msgs.msg import PlanStatistics as StatisticsMessage
 from push_msgs.msg import PushPlan as PlanMessage
 from push_msgs.msg import PushSegment as SegmentMessage
 from push_msgs.msg import Trajectory as TrajectoryMessage
-from push_ros.validation import FRAME, InvalidMessage, check_frame, finite, planar_pose
+from push_ros.validation import FARTHEST, FRAME, InvalidMessage, check_frame, finite, planar_pose
 
 
 def time_to_ros(seconds: float) -> Time:
@@ -49,6 +51,64 @@ def pose_stamped_to_ros(pose: Array, seconds: float) -> PoseStamped:
     message.header.frame_id = FRAME
     message.header.stamp = time_to_ros(seconds)
     return message
+
+
+def poses_to_ros(poses: Mapping[str, Array], seconds: float) -> Poses:
+    """A frame of poses ``(3,)`` by name, measured at a time [s]."""
+    message = Poses(names=list(poses))
+    message.header.frame_id = FRAME
+    message.header.stamp = time_to_ros(seconds)
+    table = np.array(list(poses.values()), dtype=np.float64).reshape(-1, 3)
+    message.x, message.y, message.theta = (_doubles(column) for column in table.T)
+    return message
+
+
+def poses_from_ros(
+    message: Poses, wanted: Collection[str] | None = None
+) -> tuple[dict[str, Array], list[str]]:
+    """Poses ``(3,)`` by name, and a sentence for each that is refused.
+
+    wanted: names to look at; all, when None. Raises InvalidMessage when it is no frame at all.
+    """
+    columns = [np.asarray(a, dtype=np.float64) for a in (message.x, message.y, message.theta)]
+    if {len(c) for c in columns} != {len(message.names)}:
+        raise InvalidMessage("a frame's arrays must have the same length")
+    table = np.column_stack(columns)
+    poses: dict[str, Array] = {}
+    refused = []
+    for name, pose in zip(message.names, table, strict=True):
+        if wanted is not None and name not in wanted:
+            continue
+        if not math.isfinite(pose.sum()) or abs(pose[2]) > FARTHEST:
+            refused.append(f"{name} is not finite")
+        elif max(abs(pose[0]), abs(pose[1])) > FARTHEST:
+            refused.append(f"{name}: ({pose[0]:.3g}, {pose[1]:.3g}) m is not a plausible position")
+        elif name in poses:
+            refused.append(f"{name} stands twice in one frame")
+        else:
+            pose[2] = se2.wrap(float(pose[2]))
+            poses[name] = pose
+    return poses, refused
+
+
+def contacts_to_ros(contacts: Sequence[Any], seconds: float) -> Contacts:
+    """Contacts of a world (body_a, body_b, position, normal, force, duty), of a time [s]."""
+    message = Contacts()
+    message.header.frame_id = FRAME
+    message.header.stamp = time_to_ros(seconds)
+    message.body_a = [c.body_a for c in contacts]
+    message.body_b = [c.body_b for c in contacts]
+    for field, prefix in (("position", ""), ("normal", "normal_"), ("force", "force_")):
+        table = np.array([getattr(c, field) for c in contacts], dtype=np.float64).reshape(-1, 3)
+        for axis, column in zip("xyz", table.T, strict=True):
+            setattr(message, prefix + axis, _doubles(column))
+    message.duty = _doubles(np.array([c.duty for c in contacts]))
+    return message
+
+
+def _doubles(values: Array) -> "array.array[float]":
+    """Quicker for a message than a list."""
+    return array.array("d", np.ascontiguousarray(values, dtype=np.float64).tobytes())
 
 
 def transform_to_ros(name: str, pose: Array, seconds: float) -> TransformStamped:
@@ -80,7 +140,7 @@ def trajectory_to_ros(trajectory: Trajectory) -> TrajectoryMessage:
     message.header.frame_id = FRAME
     columns = [trajectory.time, *trajectory.pose.T, *trajectory.twist.T]
     for name, column in zip(("time", "x", "y", "theta", "v", "omega"), columns, strict=True):
-        setattr(message, name, array.array("d", np.ascontiguousarray(column).tobytes()))
+        setattr(message, name, _doubles(column))
     return message
 
 

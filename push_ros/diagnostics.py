@@ -8,13 +8,14 @@ from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
 
+from push_ros.names import Names
 from push_ros.qos import STATUS
 
 
 class Diagnostics:
     """Publishes a node's state once a second of wall time, and counts QoS mismatches."""
 
-    def __init__(self, node: Node, values: Callable[[], Mapping[str, Any]]) -> None:
+    def __init__(self, node: Node, names: Names, values: Callable[[], Mapping[str, Any]]) -> None:
         """``values`` gives the current key-value pairs; a key ``warning`` or ``error`` that is not
         empty sets the level."""
         self._node = node
@@ -22,7 +23,9 @@ class Diagnostics:
         self.refused: dict[str, int] = {}
         self.last_refusal = ""
         self.qos_mismatches: dict[str, int] = {}
-        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", STATUS)
+        self.rivals: set[str] = set()  # topics that have more than one publisher now
+        self._single: list[str] = []
+        self._publisher = node.create_publisher(DiagnosticArray, names.world("diagnostics"), STATUS)
         self._timer = node.create_timer(
             1.0, self.publish, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
@@ -53,15 +56,36 @@ class Diagnostics:
             f"a {kind} of {topic} has an incompatible QoS ({info.last_policy_kind})"
         )
 
+    def watch_publishers(self, topic: str) -> None:
+        """Warn when more than one publishes on a topic that is to have one source."""
+        self._single.append(topic)
+
+    def _rivals(self) -> str:
+        """What to warn of: topics with more than one publisher. Each is logged once."""
+        found = []
+        for topic in self._single:
+            count = int(self._node.count_publishers(topic))
+            if count > 1:
+                found.append(f"{count} publishers on {topic}")
+                if topic not in self.rivals:
+                    self._node.get_logger().warning(f"{found[-1]}; there must be one")
+                self.rivals.add(topic)
+            else:
+                self.rivals.discard(topic)
+        return "; ".join(found)
+
     def publish(self) -> None:
         """Publish now."""
         values = dict(self._values())
+        rivals = self._rivals()
         for topic, count in self.refused.items():
             values[f"refused {topic}"] = count
         for topic, count in self.qos_mismatches.items():
             values[f"incompatible QoS {topic}"] = count
-        status = DiagnosticStatus(name=self._node.get_name(), hardware_id="planar-push")
-        error, warning = str(values.pop("error", "")), str(values.pop("warning", ""))
+        status = DiagnosticStatus(
+            name=self._node.get_fully_qualified_name().strip("/"), hardware_id="planar-push"
+        )
+        error, warning = str(values.pop("error", "")), str(values.pop("warning", "")) or rivals
         status.level = DiagnosticStatus.OK
         status.message = "running"
         if self.qos_mismatches or warning:

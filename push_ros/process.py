@@ -22,7 +22,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from push_model.settings import SettingsError
 
-_claims: list[IO[str]] = []
+_claims: dict[int, IO[str]] = {}
 
 
 def prepare_environment(environment: dict[str, str] | None = None) -> dict[str, str]:
@@ -59,20 +59,32 @@ def claim_domain() -> int:
         except OSError:
             file.close()
             continue
-        _claims.append(file)
+        _claims[domain] = file
         os.environ["ROS_DOMAIN_ID"] = str(domain)
         return domain
     raise RuntimeError("all hundred ROS domains for lockstep runs are in use")
 
 
-def reaches(node: Node, publisher: Any, name: str) -> bool:
-    """Whether what a publisher of the node sends now is heard by the node called ``name``.
+def release_domain(domain: int) -> None:
+    """Give a claimed domain back."""
+    _claims.pop(domain).close()
 
-    A count of subscriptions is not enough: it may be the recorder's.
+
+def heard(node: Node, publisher: Any, state_type: str = "push_msgs/msg/JobState") -> bool:
+    """Whether what a publisher of the node sends now is heard by who owns the job.
+
+    A count of subscriptions is not enough, it may be the recorder's: one of them must belong to a
+    node that publishes the state of a job.
     """
     known = node.get_subscriptions_info_by_topic(publisher.topic_name)
-    heard = any(info.node_name == name for info in known)
-    return heard and int(publisher.get_subscription_count()) >= len(known)
+    listeners = {(info.node_namespace, info.node_name) for info in known}
+    topic = publisher.topic_name.rsplit("/", 1)[0] + "/job_state"
+    owners = {
+        (info.node_namespace, info.node_name)
+        for info in node.get_publishers_info_by_topic(topic)
+        if info.topic_type == state_type
+    }
+    return bool(listeners & owners) and int(publisher.get_subscription_count()) >= len(known)
 
 
 class Spinner:

@@ -12,7 +12,8 @@ FRAME = "map"
 """The fixed frame of the project."""
 
 _NORM_TOLERANCE = 1e-2
-_FARTHEST = 1e5  # [m] from the origin
+FARTHEST = 1e5
+"""[m] from the origin that a body can plausibly be."""
 
 
 class InvalidMessage(ValueError):
@@ -38,7 +39,7 @@ def planar_pose(message: Any, what: str = "pose") -> Array:
     """
     p, q = message.position, message.orientation
     finite((p.x, p.y, p.z, q.x, q.y, q.z, q.w), what)
-    if max(abs(p.x), abs(p.y)) > _FARTHEST:
+    if max(abs(p.x), abs(p.y)) > FARTHEST:
         raise InvalidMessage(f"{what}: ({p.x:.3g}, {p.y:.3g}) m is not a plausible position")
     norm = math.hypot(q.x, q.y, q.z, q.w)
     if abs(norm - 1.0) > _NORM_TOLERANCE:

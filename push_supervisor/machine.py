@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any
 
-from push_model.settings import bounded
+from push_model.jobs import JobError
+from push_model.settings import bounded, settings
 
 
 class State(IntEnum):
@@ -24,27 +25,7 @@ class State(IntEnum):
     DETACHING = 6
 
 
-class JobError(IntEnum):
-    """How a job ended; the codes of the MoveObject action."""
-
-    NONE = 0
-    INVALID_GOAL = 301
-    UNKNOWN_OBJECT = 302
-    UNKNOWN_FRAME = 303
-    OUTSIDE_MAP = 304
-    GOAL_OCCUPIED = 305
-    PLANNING_FAILED = 306
-    POSITIONING_FAILED = 307
-    EXECUTION_FAILED = 308
-    POSES_STALE = 309
-    CANCELED = 310
-    PREEMPTED = 311
-    OFF_TARGET = 312
-    CLOCK_RESET = 313
-    NODE_LOST = 314
-
-
-@dataclass(frozen=True)
+@settings
 class SupervisorSettings:
     """Tolerances, patience and speeds of a job."""
 

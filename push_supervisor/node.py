@@ -1,46 +1,44 @@
 """The supervisor node: goals in, plans and trajectories out, one state machine in between."""
 
-import struct
 import time
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import OccupancyGrid
-from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rclpy.serialization import deserialize_message
-from std_msgs.msg import Header, String
-from std_srvs.srv import Trigger
+from std_msgs.msg import Header
 
+from push_estimation.pose_gate import PoseGateSettings, Stamp
 from push_model import se2
 from push_model.arrays import Array
+from push_model.jobs import GoalRefused
 from push_model.occupancy import OccupancyGrid as Grid
 from push_model.push_segment import PushSegment
 from push_model.settings import SettingsError
 from push_model.trajectory import Trajectory
 from push_msgs.action import FollowTrajectory, MoveObject, PlanPush
-from push_msgs.msg import NamedPoses, PushPlan, SupervisorState
+from push_msgs.msg import PushPlan
 from push_msgs.srv import PlanRobotPath
 from push_planner import PlannerSettings, PushPlanner, preemptive_pushes
-from push_ros.actions import GoalClient, GoalServer
+from push_ros.actions import GoalClient
 from push_ros.conversions import (
     circles_to_ros,
     grid_from_ros,
     pose_stamped_to_ros,
     pose_to_ros,
     segment_from_ros,
-    time_from_ros,
     trajectory_from_ros,
     trajectory_to_ros,
 )
 from push_ros.diagnostics import Diagnostics
+from push_ros.job_intake import JobIntake
+from push_ros.names import names_of
 from push_ros.parameters import declare_settings
-from push_ros.pose_tracker import PoseTracker, PoseTrackerSettings, Stamp
-from push_ros.qos import COMMAND, LATCHED, STREAM
-from push_ros.scenario import Scenario, load_scenario
-from push_ros.validation import FRAME, InvalidMessage, planar_pose, stamped_pose
+from push_ros.pose_feed import Frame, PoseFeed
+from push_ros.qos import LATCHED, STREAM
+from push_ros.validation import FRAME, InvalidMessage
+from push_scenario.scenario import Scenario, load_scenario
 from push_supervisor import (
     Command,
     Event,
@@ -63,19 +61,20 @@ _ASKS = 3  # times that the planner is asked the same
 _POSE_PERIOD = 0.045  # [s] of the frames that are looked at
 
 
-class GoalRefused(Exception):
-    """A goal that cannot be taken; carries the code."""
-
-    def __init__(self, code: JobError, message: str) -> None:
-        super().__init__(message)
-        self.code = code
-
-
 class SupervisorNode(Node):
     """One robot, one object, one job at a time."""
 
-    def __init__(self, scenario: Scenario | None = None, robot: str = "", item: str = "") -> None:
-        super().__init__("supervisor")
+    def __init__(
+        self,
+        scenario: Scenario | None = None,
+        robot: str = "",
+        item: str = "",
+        namespace: str = "",
+        world: str = "",
+    ) -> None:
+        """namespace: the team's; world: the bridge's, where it is another one."""
+        super().__init__("supervisor", namespace=namespace)
+        self.names = names_of(self, world)
         name = self.declare_parameter("scenario", "env1-target1").value
         robot = str(self.declare_parameter("robot", robot).value)
         item = str(self.declare_parameter("object", item).value)
@@ -94,9 +93,7 @@ class SupervisorNode(Node):
             "planner",
             "planner",
         )
-        self._poses = PoseTracker(
-            declare_settings(self, PoseTrackerSettings, poses, "poses", "supervisor.poses")
-        )
+        gate = declare_settings(self, PoseGateSettings, poses, "poses", "supervisor.poses")
         self._object_radius = self._object_spec.geometry.circumradius
         self.machine = Machine(self.settings, self._at_goal)
         self._obstacles = np.zeros((0, 3))
@@ -104,7 +101,6 @@ class SupervisorNode(Node):
         self._grid: Grid | None = None
         self._ticks = 0
         self._seed = 0
-        self._last_wall = time.monotonic()
         self._lost_since: float | None = None
         self._displaced = 0
         self._following = False
@@ -116,52 +112,31 @@ class SupervisorNode(Node):
         self._queue: list[tuple[Event, dict[str, Any]]] = []
         self._handling = False
         self._waiting: tuple[Command, dict[str, Any]] | None = None
-        self._diagnostics = Diagnostics(self, self._diagnose)
-        self._connect()
+        self._diagnostics = Diagnostics(self, self.names, self._diagnose)
+        self._connect(gate)
         self._publish_state()
 
-    def _connect(self) -> None:
-        events = self._diagnostics.subscription_events
-        self._state_publisher = self.create_publisher(SupervisorState, "/supervisor/state", LATCHED)
-        self._text_publisher = self.create_publisher(String, "/supervisor/status_text", LATCHED)
-        self._heartbeat_publisher = self.create_publisher(
-            Header, f"/{self.robot}/heartbeat", STREAM
+    def _connect(self, gate: PoseGateSettings) -> None:
+        names, diagnostics = self.names, self._diagnostics
+        heartbeat = names.robot(self.robot, "heartbeat")
+        self._heartbeat_publisher = self.create_publisher(Header, heartbeat, STREAM)
+        self._plan_client = GoalClient(self, PlanPush, names.team("plan_push"))
+        self._follow_client = GoalClient(
+            self, FollowTrajectory, names.robot(self.robot, "follow_trajectory")
         )
-        self._plan_client = GoalClient(self, PlanPush, "/plan_push")
-        self._follow_client = GoalClient(self, FollowTrajectory, f"/{self.robot}/follow_trajectory")
-        self._path_client = self.create_client(PlanRobotPath, "/plan_robot_path")
-        self._job = GoalServer(
-            self,
-            MoveObject,
-            "/move_object",
-            check=lambda request: None,
-            refuse=self._refuse_job,
-            preempt=self._preempt,
-            start=lambda request: self._take_goal(
-                stamped_pose(request.goal, "the goal"), bool(request.plan_only)
-            ),
-            cancel=self._cancel,
-        )
-        self.create_service(Trigger, "/supervisor/execute", self._on_execute)
-        self.create_service(Trigger, "/supervisor/cancel", self._on_cancel)
-        self.create_subscription(
-            PoseStamped,
-            "/goal_pose",
-            self._on_goal_pose,
-            COMMAND,
-            event_callbacks=events("/goal_pose"),
+        self._path_client = self.create_client(PlanRobotPath, names.team("plan_robot_path"))
+        self._intake = JobIntake(
+            self, names, diagnostics, self, "single", [self.robot], self.object
         )
         self.create_subscription(
-            OccupancyGrid, "/map", self._on_map, LATCHED, event_callbacks=events("/map")
+            OccupancyGrid,
+            names.world("map"),
+            self._on_map,
+            LATCHED,
+            event_callbacks=diagnostics.subscription_events(names.world("map")),
         )
-        self.create_subscription(
-            NamedPoses,
-            "/poses",
-            self._on_poses,
-            STREAM,
-            event_callbacks=events("/poses"),
-            raw=True,
-        )
+        bodies = list(self._scenario.radii)
+        self._poses = PoseFeed(self, names, gate, bodies, diagnostics, self._on_frame, _POSE_PERIOD)
         self._watchdog = self.create_timer(
             0.1, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
@@ -199,109 +174,47 @@ class SupervisorNode(Node):
         margin = self.settings.obstacle_margin
         self._obstacles = motions.wall_circles(grid, self._robot_spec.body_radius, margin)
 
-    def _on_goal_pose(self, message: PoseStamped) -> None:
-        try:
-            goal = self._parse_goal(message, "/goal_pose")
-        except GoalRefused as refusal:
-            self._say_no(refusal)
-            return
-        self._preempt()
-        self._take_goal(goal, False)
+    @property
+    def busy(self) -> bool:
+        """See JobOwner."""
+        return self.machine.busy
 
-    def _refuse_job(self, request: Any) -> Any:
-        """The result for a job that cannot be: it never touches the one under way."""
-        try:
-            if request.object not in ("", self.object):
-                raise GoalRefused(JobError.UNKNOWN_OBJECT, f"unknown object '{request.object}'")
-            self._parse_goal(request.goal, "/move_object")
-        except GoalRefused as refusal:
-            self._say_no(refusal)
-            return MoveObject.Result(error_code=int(refusal.code), error_msg=str(refusal))
-        return None
+    @property
+    def plan_ready(self) -> bool:
+        """See JobOwner."""
+        return self.machine.plan_ready
 
-    def _parse_goal(self, message: PoseStamped, topic: str) -> Array:
-        """The goal ``(3,)``; raises GoalRefused."""
-        try:
-            goal = stamped_pose(message, "the goal")
-        except InvalidMessage as error:
-            self._diagnostics.refuse(topic, str(error))
-            frame = message.header.frame_id != FRAME
-            code = JobError.UNKNOWN_FRAME if frame else JobError.INVALID_GOAL
-            raise GoalRefused(code, f"goal refused: {error}") from None
+    def check_goal(self, goal: Array) -> None:
+        """See JobOwner."""
         if self._grid is not None and not self._grid.contains(goal[0], goal[1]):
             text = f"({goal[0]:.2f}, {goal[1]:.2f}) lies outside the map"
-            self._diagnostics.refuse(topic, text)
-            raise GoalRefused(JobError.OUTSIDE_MAP, f"goal refused: {text}")
-        return goal
+            raise GoalRefused(JobError.OUTSIDE_MAP, text)
 
-    def _say_no(self, refusal: "GoalRefused") -> None:
-        self.get_logger().warning(str(refusal))
-        if self.machine.busy:  # a job that is under way goes on, and so does its state
-            self._publish_state(str(refusal))
-            return
-        self.machine.error, self.machine.reason = refusal.code, str(refusal)
-        self._publish_state()
-
-    def _preempt(self) -> None:
-        if self.machine.busy or self.machine.plan_ready:
-            why = "a new goal replaces this one"
-            self._fire(Event.ABORT, code=JobError.PREEMPTED, message=why)
-
-    def _take_goal(self, goal: Array, plan_only: bool) -> None:
+    def take_goal(self, goal: Array, plan_only: bool) -> None:
+        """See JobOwner."""
         self._fire(Event.GOAL, goal=goal, plan_only=plan_only)
 
-    def _on_execute(self, request: Any, response: Any) -> Any:
-        response.success = self.machine.plan_ready
-        response.message = "executing" if response.success else "there is no plan to execute"
+    def end_job(self, code: JobError, message: str) -> None:
+        """See JobOwner."""
+        self._fire(Event.ABORT, code=code, message=message)
+
+    def execute(self) -> None:
+        """See JobOwner."""
         self._fire(Event.EXECUTE)
-        return response
 
-    def _on_cancel(self, request: Any, response: Any) -> Any:
-        response.success = self.machine.busy or self.machine.plan_ready
-        response.message = "canceled" if response.success else "there is nothing to cancel"
-        self._cancel()
-        return response
-
-    def _cancel(self) -> None:
-        self._fire(Event.CANCEL)
-
-    def _on_poses(self, data: bytes) -> None:
-        """Take a frame every 50 ms; the rest of a fast stream is not even deserialised."""
-        try:
-            # CDR: four bytes of encapsulation, then the header's stamp.
-            seconds, nanoseconds = struct.unpack_from("<iI", data, 4)
-            if 0.0 <= seconds + 1e-9 * nanoseconds - self._poses.stamp < _POSE_PERIOD:
-                return
-            message = deserialize_message(data, NamedPoses)
-        except (struct.error, RuntimeError, RCLError) as error:
-            self._diagnostics.refuse("/poses", f"unreadable: {error}")
+    def _on_frame(self, frame: Frame) -> None:
+        """Frames come every 50 ms."""
+        if frame.verdict is Stamp.REFUSED:
             return
-        self._take_poses(message)
-
-    def _take_poses(self, message: NamedPoses) -> None:
-        if message.header.frame_id != FRAME:
-            self._diagnostics.refuse("/poses", f"frame '{message.header.frame_id}'")
-            return
-        verdict = self._poses.begin(time_from_ros(message.header.stamp))
-        if verdict is Stamp.REFUSED:
-            self._diagnostics.refuse("/poses", "its stamp is zero or not newer than the last")
-            return
-        self._last_wall = time.monotonic()
-        for named in message.poses:
-            if named.name in (self.robot, self.object):
-                try:
-                    self._poses.accept(named.name, planar_pose(named.pose, named.name))
-                except InvalidMessage as error:
-                    self._diagnostics.refuse("/poses", str(error))
-        if verdict is Stamp.RESET:
+        if frame.verdict is Stamp.RESET:
             self._fire(Event.CLOCK_RESET)
         self._ticks += 1
-        self._heartbeat_publisher.publish(Header(stamp=message.header.stamp, frame_id=FRAME))
+        self._heartbeat_publisher.publish(Header(stamp=frame.stamp, frame_id=FRAME))
         self._retry_waiting()
         if self._ticks % 2 == 0:
             self._watch_displacement()
-            if self._job.active:
-                self._job.feedback(self._feedback())
+            if self._intake.waited_for:
+                self._intake.feedback(self._feedback())
 
     def _watch_displacement(self) -> None:
         """Whether somebody moved the object while the robot was on its way to it."""
@@ -325,7 +238,7 @@ class SupervisorNode(Node):
 
     def _on_watchdog(self) -> None:
         """Wall time: a lost controller, a silent pose stream."""
-        if time.monotonic() - self._last_wall > 0.3:
+        if self._poses.silence > 0.3:
             self._retry_waiting()
 
     # The machine
@@ -392,8 +305,8 @@ class SupervisorNode(Node):
 
     def _pose(self, name: str) -> Array | None:
         """The pose ``(3,)`` of a body, None when it is not known now."""
-        silence = time.monotonic() - self._last_wall
-        return None if silence > self.settings.pose_timeout else self._poses.pose(name)
+        silent = self._poses.silence > self.settings.pose_timeout
+        return None if silent else self._poses.pose(name)
 
     def _watch_servers(self) -> None:
         """A node that dies in the middle of its work never answers.
@@ -521,6 +434,7 @@ class SupervisorNode(Node):
         standoff = motions.standoff(segment, item)
         reach = self._object_radius + self._robot_spec.footprint_radius
         request = PlanRobotPath.Request(
+            robot=self.robot,
             start=pose_to_ros(robot),
             goal=pose_to_ros(standoff),
             obstacles=circles_to_ros(np.array([[item[0], item[1], reach]])),
@@ -549,6 +463,7 @@ class SupervisorNode(Node):
     def _move(self, trajectory: Trajectory, circles: Array) -> None:
         goal = FollowTrajectory.Goal(
             mode=FollowTrajectory.Goal.MOVE,
+            object=self.object,
             trajectory=trajectory_to_ros(trajectory),
             obstacles=circles_to_ros(motions.near(circles, trajectory)),
             heartbeat_timeout=self.settings.heartbeat_timeout,
@@ -603,10 +518,8 @@ class SupervisorNode(Node):
         return there, f"{1e3 * way:.1f} mm, {turn:.3f} rad"
 
     def _end_job(self, code: JobError, message: str) -> None:
-        if not self._job.active:
-            return
         way, turn = self._errors(self.machine.goal)
-        self._job.finish(
+        self._intake.finish(
             MoveObject.Result(
                 error_code=int(code),
                 error_msg=message,
@@ -614,8 +527,7 @@ class SupervisorNode(Node):
                 orientation_error=turn,
                 pushes=self.machine.pushes,
                 replans=self.machine.replans,
-            ),
-            success=code is JobError.NONE,
+            )
         )
 
     def _feedback(self) -> Any:
@@ -629,25 +541,21 @@ class SupervisorNode(Node):
             distance_to_goal=way,
         )
 
-    def _publish_state(self, reason: str = "") -> None:
+    def _publish_state(self) -> None:
         m = self.machine
-        message = SupervisorState(
+        done = min(m.index, len(m.segments))
+        self._intake.publish(
+            self._poses.stamp,
             state=int(m.state),
             state_name=m.state.name,
-            reason=reason or m.reason,
+            reason=m.reason,
             error_code=int(m.error),
-            plan_ready=m.plan_ready,
-            push_index=m.index,
-            push_count=len(m.segments),
+            progress=done / len(m.segments) if m.segments else float(not m.busy),
+            step_index=m.index,
+            step_count=len(m.segments),
             replans=m.replans,
         )
-        message.header.frame_id = FRAME
-        message.header.stamp = pose_stamped_to_ros(np.zeros(3), self._poses.stamp).header.stamp
-        if m.goal is not None:
-            message.goal = pose_stamped_to_ros(m.goal, self._poses.stamp)
-        self._state_publisher.publish(message)
-        self._text_publisher.publish(String(data=f"{m.state.name}: {message.reason}"))
-        self.get_logger().info(f"{m.state.name}: {message.reason}")
+        self.get_logger().info(f"{m.state.name}: {m.reason}")
 
     def _diagnose(self) -> dict[str, Any]:
         m = self.machine
@@ -656,7 +564,7 @@ class SupervisorNode(Node):
             "reason": m.reason,
             "error code": int(m.error),
             "replans": m.replans,
-            "poses refused": self._poses.refused,
-            "pose jumps": self._poses.jumps,
+            "poses refused": self._poses.gate.refused,
+            "pose jumps": self._poses.gate.jumps,
             "warning": "no poses" if self._pose(self.object) is None else "",
         }

@@ -5,8 +5,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from push_model.arrays import Array
 from push_ros.conversions import pose_to_ros, time_to_ros
-from push_ros.scenario import Scenario
 from push_ros.validation import FRAME
+from push_scenario.scenario import Scenario
 
 
 def body_markers(scenario: Scenario, poses: dict[str, Array], seconds: float) -> MarkerArray:

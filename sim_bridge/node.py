@@ -4,31 +4,31 @@ import math
 import time
 from typing import Any
 
-from geometry_msgs.msg import Point, TwistStamped, Vector3
+from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import OccupancyGrid
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock as ClockMessage
+from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 from visualization_msgs.msg import MarkerArray
 
-from push_model.arrays import Array
 from push_model.settings import SettingsError
-from push_msgs.msg import Contact as ContactMessage
-from push_msgs.msg import Contacts, NamedPose, NamedPoses
+from push_msgs.msg import Contacts, Poses
 from push_msgs.srv import LoadScenario, Reset
 from push_ros.conversions import (
+    contacts_to_ros,
     grid_to_ros,
-    pose_to_ros,
+    poses_to_ros,
     time_from_ros,
     time_to_ros,
     transform_to_ros,
 )
 from push_ros.diagnostics import Diagnostics
+from push_ros.names import names_of
 from push_ros.parameters import declare_settings
 from push_ros.qos import CLOCK, COMMAND, LATCHED, STATUS, STREAM
-from push_ros.scenario import Scenario, load_scenario
-from push_ros.validation import FRAME
+from push_scenario.scenario import Scenario, load_scenario
 from sim_bridge.markers import body_markers
 from sim_bridge.motion_capture import MotionCapture
 from sim_bridge.pace import Lockstep, RealTime
@@ -38,15 +38,18 @@ from sim_bridge.settings import (
     PhysicsSettings,
     steps_per_tick,
 )
-from sim_bridge.world import Contact, World
+from sim_bridge.world import World
 from tf2_msgs.msg import TFMessage
 
 
 class BridgeNode(Node):
     """Publishes the pose stream, the map and the clock; drives the wheels from /<robot>/cmd_vel."""
 
-    def __init__(self, scenario: Scenario | None = None, autostart: bool = True) -> None:
-        super().__init__("bridge")
+    def __init__(
+        self, scenario: Scenario | None = None, autostart: bool = True, namespace: str = ""
+    ) -> None:
+        super().__init__("bridge", namespace=namespace)
+        self._names = names_of(self)
         name = self.declare_parameter("scenario", "env1-target1").value
         self._scenario = scenario or load_scenario(str(name))
         values = dict(self._scenario.parameters.get("bridge", {}))
@@ -61,7 +64,7 @@ class BridgeNode(Node):
         self._steps = steps_per_tick(self._physics, self._capture_settings)
         self.period = 1.0 / self._capture_settings.rate
         self._decimation = max(1, round(self._capture_settings.rate / self.settings.tf_rate))
-        self._diagnostics = Diagnostics(self, self._state)
+        self._diagnostics = Diagnostics(self, self._names, self._state)
         self._make_publishers()
         self._lockstep = Lockstep()
         self._pace = RealTime(self.period, self.settings.real_time_factor)
@@ -80,16 +83,20 @@ class BridgeNode(Node):
         self._timer = self.create_timer(max(wall, 1e-3), self._on_timer, clock=steady)
 
     def _make_publishers(self) -> None:
-        self._clock_publisher = self.create_publisher(ClockMessage, "/clock", CLOCK)
+        name = self._names.world
         events = self._diagnostics.publisher_events
+        self._clock_publisher = self.create_publisher(ClockMessage, name("clock"), CLOCK)
         self._poses_publisher = self.create_publisher(
-            NamedPoses, "/poses", STREAM, event_callbacks=events("/poses")
+            Poses, name("poses"), STREAM, event_callbacks=events(name("poses"))
         )
-        self._truth_publisher = self.create_publisher(NamedPoses, "/ground_truth/poses", STREAM)
-        self._contacts_publisher = self.create_publisher(Contacts, "/contacts", STREAM)
-        self._tf_publisher = self.create_publisher(TFMessage, "/tf", STATUS)
-        self._marker_publisher = self.create_publisher(MarkerArray, "/visualization", STATUS)
-        self._map_publisher = self.create_publisher(OccupancyGrid, "/map", LATCHED)
+        self._diagnostics.watch_publishers(name("poses"))
+        self._truth_publisher = self.create_publisher(Poses, name("ground_truth/poses"), STREAM)
+        self._contacts_publisher = self.create_publisher(Contacts, name("contacts"), STREAM)
+        self._tf_publisher = self.create_publisher(TFMessage, name("tf"), STATUS)
+        self._marker_publisher = self.create_publisher(MarkerArray, name("visualization"), STATUS)
+        self._map_publisher = self.create_publisher(OccupancyGrid, name("map"), LATCHED)
+        self._pause_publisher = self.create_publisher(Bool, name("paused"), LATCHED)
+        self._pause_publisher.publish(Bool(data=False))
         self._inputs: list[Any] = []
 
     def _build(self) -> None:
@@ -103,7 +110,7 @@ class BridgeNode(Node):
             self.destroy_subscription(subscription)
         self._inputs = []
         for robot in s.robots:
-            topic = f"/{robot}/cmd_vel"
+            topic = self._names.robot(robot, "cmd_vel")
             self._inputs.append(
                 self.create_subscription(
                     TwistStamped,
@@ -132,7 +139,15 @@ class BridgeNode(Node):
 
     def commanded(self) -> list[str]:
         """Robots that somebody publishes commands for."""
-        return [r for r in self._scenario.robots if self.count_publishers(f"/{r}/cmd_vel") > 0]
+        return [
+            r
+            for r in self._scenario.robots
+            if self.count_publishers(self._names.robot(r, "cmd_vel")) > 0
+        ]
+
+    def heard_by(self, count: int) -> bool:
+        """Whether so many listen to the poses."""
+        return bool(self.count_subscribers(self._names.world("poses")) >= count)
 
     def start(self) -> None:
         """Begin to step, in lockstep mode too."""
@@ -179,9 +194,9 @@ class BridgeNode(Node):
         if robot not in self._scenario.robots:
             return  # one that is gone with the last scenario
         v, omega = message.twist.linear.x, message.twist.angular.z
-        limit = 10.0 * self._scenario.robots[robot][0].drive.max_speed
-        turn_limit = 10.0 * self._scenario.robots[robot][0].drive.max_turn_rate
-        topic = f"/{robot}/cmd_vel"
+        limit = 10.0 * self._scenario.robots[robot][0].max_speed
+        turn_limit = 10.0 * self._scenario.robots[robot][0].max_turn_rate
+        topic = self._names.robot(robot, "cmd_vel")
         if not (math.isfinite(v) and math.isfinite(omega)):
             self._diagnostics.refuse(topic, f"not finite: v={v}, omega={omega}")
             return
@@ -242,10 +257,10 @@ class BridgeNode(Node):
         self._clock_publisher.publish(ClockMessage(clock=stamp))
         # messages that nobody reads are not even made
         if self._truth_publisher.get_subscription_count():
-            self._truth_publisher.publish(self._frame_to_ros(truth, self.tick))
+            self._truth_publisher.publish(poses_to_ros(truth, self.time))
         contacts = self.world.read_contacts()
         if self._contacts_publisher.get_subscription_count():
-            self._contacts_publisher.publish(self._contacts_to_ros(contacts, stamp))
+            self._contacts_publisher.publish(contacts_to_ros(contacts, self.time))
         if self.tick % self._decimation == 0:
             if self._tf_publisher.get_subscription_count():
                 transforms = [transform_to_ros(n, p, self.time) for n, p in truth.items()]
@@ -258,33 +273,8 @@ class BridgeNode(Node):
         frame = self._capture.observe(self.tick, truth)
         if frame is None:
             return None
-        self._poses_publisher.publish(self._frame_to_ros(frame.poses, frame.stamp))
+        self._poses_publisher.publish(poses_to_ros(frame.poses, frame.stamp * self.period))
         return frame.stamp
-
-    def _frame_to_ros(self, poses: dict[str, Array], tick: int) -> NamedPoses:
-        message = NamedPoses(
-            poses=[NamedPose(name=n, pose=pose_to_ros(p)) for n, p in poses.items()]
-        )
-        message.header.frame_id = FRAME
-        message.header.stamp = time_to_ros(tick * self.period)
-        return message
-
-    def _contacts_to_ros(self, contacts: list[Contact], stamp: Any) -> Contacts:
-        message = Contacts()
-        message.header.frame_id = FRAME
-        message.header.stamp = stamp
-        message.contacts = [
-            ContactMessage(
-                body_a=c.body_a,
-                body_b=c.body_b,
-                position=Point(x=c.position[0], y=c.position[1], z=c.position[2]),
-                normal=Vector3(x=c.normal[0], y=c.normal[1], z=c.normal[2]),
-                force=Vector3(x=c.force[0], y=c.force[1], z=c.force[2]),
-                duty=c.duty,
-            )
-            for c in contacts
-        ]
-        return message
 
     def _on_reset(self, request: Any, response: Any) -> Any:
         assert self.world is not None
@@ -306,6 +296,7 @@ class BridgeNode(Node):
 
     def _on_pause(self, request: Any, response: Any) -> Any:
         self._paused = bool(request.data)
+        self._pause_publisher.publish(Bool(data=self._paused))
         self._pace.restart()
         response.success, response.message = True, "paused" if self._paused else "running"
         return response

@@ -6,13 +6,14 @@ from pathlib import Path
 import pybullet as pb
 
 from push_model.arrays import Array
+from push_model.drives import SpeedDrive
+from push_model.settings import SettingsError
 from push_model.specs import RobotSpec
 from sim_bridge.collision_groups import BODY_GROUP, FLOOR_GROUP
 
 WHEELS = (0, 1)
 """Link and joint indices of the left and the right wheel."""
 BODY = -1
-_CASTER_CLEARANCE = 2e-4  # [m] above the floor at rest; the robot leans on one caster at a time
 
 
 def robot_urdf(spec: RobotSpec) -> str:
@@ -21,14 +22,15 @@ def robot_urdf(spec: RobotSpec) -> str:
     Wheels are spheres because PyBullet's cylinders are polygons by default and cost 4 % in
     distance; they touch nothing but the floor.
     """
-    body_mass = spec.mass - 2.0 * spec.wheel_mass
-    h, r, wr = spec.body_height, spec.body_radius, spec.wheel_radius
+    drive = _speed_drive(spec)
+    body_mass = spec.mass - 2.0 * drive.wheel_mass
+    h, r, wr = spec.body_height, spec.body_radius, drive.wheel_radius
     ixx = body_mass * (3.0 * r**2 + h**2) / 12.0
     izz = body_mass * r**2 / 2.0
-    b = spec.bumper
+    b = spec.flat_bumper
     thickness = min(0.005, b.distance / 4.0)
     body_z = h / 2.0 - wr + 0.005  # the body's underside clears the floor by 5 mm
-    bumper_z = 0.0  # at the height of the axle: far from the edges of what it pushes
+    bumper_z = spec.bumper_z - wr
     collisions = (
         _collision(f'<cylinder radius="{r}" length="{h - 0.005}"/>', 0.0, body_z)
         + _collision(
@@ -43,27 +45,33 @@ def robot_urdf(spec: RobotSpec) -> str:
         )
     )
     text = '<robot name="robot">' + _link("body", body_mass, ixx, ixx, izz, collisions, -0.005)
-    roll = spec.wheel_mass * wr**2 / 2.0
+    roll = drive.wheel_mass * wr**2 / 2.0
     for name, side in (("left", 1.0), ("right", -1.0)):
         text += _link(
-            name, spec.wheel_mass, roll, roll, roll, _collision(f'<sphere radius="{wr}"/>', 0, 0)
+            name, drive.wheel_mass, roll, roll, roll, _collision(f'<sphere radius="{wr}"/>', 0, 0)
         )
         text += (
             f'<joint name="{name}_axle" type="continuous"><parent link="body"/>'
-            f'<child link="{name}"/><origin xyz="0 {side * spec.half_track} 0"/>'
+            f'<child link="{name}"/><origin xyz="0 {side * drive.half_track} 0"/>'
             '<axis xyz="0 1 0"/></joint>'
         )
     caster = 0.2 * wr
-    for name, x in (("front", 0.75 * r), ("rear", -0.75 * r)):
+    for name, x in zip(("front", "rear"), spec.casters or (), strict=True):
         text += _link(
             name, 1e-4, 1e-8, 1e-8, 1e-8, _collision(f'<sphere radius="{caster}"/>', 0, 0)
         )
-        z = -wr + caster + _CASTER_CLEARANCE
+        z = -wr + caster + spec.caster_clearance
         text += (
             f'<joint name="{name}_caster" type="fixed"><parent link="body"/>'
             f'<child link="{name}"/><origin xyz="{x} 0 {z}"/></joint>'
         )
     return text + "</robot>"
+
+
+def _speed_drive(spec: RobotSpec) -> SpeedDrive:
+    if not isinstance(spec.drive, SpeedDrive):
+        raise SettingsError(f"no body in simulation yet for a drive '{spec.drive.kind}'")
+    return spec.drive
 
 
 def _collision(geometry: str, x: float, z: float) -> str:
@@ -85,19 +93,19 @@ class RobotBody:
 
     def __init__(self, client: int, spec: RobotSpec, start: Array) -> None:
         self.spec = spec
-        self.drive = spec.drive
+        self.drive = _speed_drive(spec)
         self._client = client
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "robot.urdf"
             path.write_text(robot_urdf(spec))
             self.body = pb.loadURDF(
                 str(path),
-                [0.0, 0.0, spec.wheel_radius],
+                [0.0, 0.0, self.drive.wheel_radius],
                 physicsClientId=client,
                 flags=pb.URDF_USE_IMPLICIT_CYLINDER,
             )
         for link in range(-1, 4):
-            friction = 1.0 if link == BODY else spec.wheel_friction if link in WHEELS else 0.0
+            friction = 1.0 if link == BODY else self.drive.wheel_friction if link in WHEELS else 0.0
             pb.changeDynamics(self.body, link, lateralFriction=friction, physicsClientId=client)
             pb.changeDynamics(
                 self.body,
@@ -119,7 +127,7 @@ class RobotBody:
     def place(self, pose: Array) -> None:
         """Put the axle midpoint at a pose ``(3,)``, at rest."""
         # The base frame of PyBullet is the body's centre of mass, 5 mm below the axle.
-        height = self.spec.wheel_radius - 0.005 + 1e-4
+        height = self.drive.wheel_radius - 0.005 + 1e-4
         quaternion = pb.getQuaternionFromEuler([0.0, 0.0, float(pose[2])])
         pb.resetBasePositionAndOrientation(
             self.body,
@@ -140,6 +148,6 @@ class RobotBody:
             WHEELS,
             pb.VELOCITY_CONTROL,
             targetVelocities=self.drive.wheel_speeds(v, omega),
-            forces=[self.spec.wheel_torque] * 2,
+            forces=[self.drive.wheel_torque] * 2,
             physicsClientId=self._client,
         )

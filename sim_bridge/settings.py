@@ -1,11 +1,9 @@
 """Settings of the simulated world and of its motion-capture stream."""
 
-from dataclasses import dataclass
-
-from push_model.settings import SettingsError, bounded
+from push_model.settings import SettingsError, bounded, settings
 
 
-@dataclass(frozen=True)
+@settings
 class PhysicsSettings:
     """PyBullet's step and solver."""
 
@@ -15,7 +13,7 @@ class PhysicsSettings:
     foot_damping: float = bounded(20.0, low=0.0, high=1e4, doc="[Ns/m] of an object's foot")
 
 
-@dataclass(frozen=True)
+@settings
 class MotionCaptureSettings:
     """The pose stream."""
 
@@ -26,7 +24,7 @@ class MotionCaptureSettings:
     dropout: float = bounded(0.0, low=0.0, high=1.0, doc="probability that a frame misses a body")
 
 
-@dataclass(frozen=True)
+@settings
 class BridgeSettings:
     """Pace, safety and publishing of the bridge."""
 

@@ -5,16 +5,23 @@ import pytest
 from hypothesis import HealthCheck, settings
 from PIL import Image
 
-from push_ros.process import claim_domain, prepare_environment
-from push_ros.scenario import config_directory, load_scenario
+from push_ros.process import claim_domain, prepare_environment, release_domain
+from push_scenario.scenario import config_directory, load_scenario
 
-claim_domain()  # every run of the tests has a domain of its own
 prepare_environment()
 # The same examples every time, on a machine of any speed.
 settings.register_profile(
     "repeatable", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("repeatable")
+
+
+@pytest.fixture(autouse=True)
+def domain():
+    """Every test has a ROS domain of its own."""
+    number = claim_domain()
+    yield number
+    release_domain(number)
 
 
 @pytest.fixture(scope="session")
@@ -34,11 +41,10 @@ def box(scenario):
 
 @pytest.fixture
 def ros():
-    """A ROS context on a domain of its own."""
+    """A ROS context."""
     import rclpy
     from rclpy.signals import SignalHandlerOptions
 
-    claim_domain()
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     yield
     rclpy.try_shutdown()

@@ -1,12 +1,10 @@
 """A new predictive controller is a file and a line: nothing else knows which one it is."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 
 from push_model import DifferentialDrive, line, unicycle_step
-from push_model.settings import SettingsError, bounded, from_mapping
+from push_model.settings import SettingsError, bounded, from_mapping, settings
 from push_mpc import (
     CONTROLLERS,
     ControllerKind,
@@ -21,7 +19,7 @@ from push_mpc import (
 DRIVE = DifferentialDrive(0.0205, 0.0265, 6.28)
 
 
-@dataclass(frozen=True)
+@settings
 class GainSettings:
     gain: float = bounded(3.0, low=0.1, high=10.0, doc="[1/s] of the speed errors")
 

@@ -19,7 +19,7 @@ from push_planner import (
 )
 from push_planner.guide_path import guide_paths, path_cost, shortest_path
 from push_planner.push_search import worth_trying
-from push_ros.scenario import load_scenario, scenario_names
+from push_scenario.scenario import load_scenario, scenario_names
 
 START, GOAL = np.array([-1.15, -0.7, 0.0]), np.array([1.3, 0.75, 0.0])
 

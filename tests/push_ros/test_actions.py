@@ -26,7 +26,7 @@ class World:
             check=self.check,
             start=lambda request: self.started.append(request.object),
             cancel=self.on_cancel,
-            preempt=lambda: self.server.finish(MoveObject.Result(error_code=311), False),
+            preempt=lambda request: self.server.finish(MoveObject.Result(error_code=311), False),
             refuse=lambda r: MoveObject.Result(error_code=301) if r.object == "odd" else None,
         )
         self.client = GoalClient(self.node, MoveObject, "/job")

@@ -3,8 +3,9 @@
 import rclpy
 from geometry_msgs.msg import PoseStamped
 
-from push_ros.process import Spinner, reaches
-from push_ros.qos import COMMAND
+from push_msgs.msg import JobState
+from push_ros.process import Spinner, heard
+from push_ros.qos import COMMAND, LATCHED
 
 
 def test_another_subscriber_does_not_count(ros):
@@ -14,17 +15,18 @@ def test_another_subscriber_does_not_count(ros):
     recorder.create_subscription(PoseStamped, "/goal_pose", lambda m: None, COMMAND)
     spinner = Spinner([node, recorder])
     assert spinner.until(lambda: publisher.get_subscription_count() > 0, 5.0)
-    assert not reaches(node, publisher, "supervisor")
-    supervisor = rclpy.create_node("supervisor")
-    heard = []
-    supervisor.create_subscription(PoseStamped, "/goal_pose", heard.append, COMMAND)
+    assert not heard(node, publisher)
+    supervisor = rclpy.create_node("any_name")
+    supervisor.create_publisher(JobState, "/job_state", LATCHED)
+    goals = []
+    supervisor.create_subscription(PoseStamped, "/goal_pose", goals.append, COMMAND)
     spinner.close()
     node = rclpy.create_node("sender")
     publisher = node.create_publisher(PoseStamped, "/goal_pose", COMMAND)
     spinner = Spinner([node, supervisor])
     try:
-        assert spinner.until(lambda: reaches(node, publisher, "supervisor"), 5.0)
+        assert spinner.until(lambda: heard(node, publisher), 5.0)
         publisher.publish(PoseStamped())
-        assert spinner.until(lambda: heard, 5.0)
+        assert spinner.until(lambda: goals, 5.0)
     finally:
         spinner.close()

@@ -14,12 +14,13 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
-from push_bringup.lockstep import LockstepRun, final_errors
 from push_msgs.action import MoveObject
-from push_msgs.msg import SupervisorState
+from push_msgs.msg import JobState
 from push_ros.conversions import pose_stamped_to_ros
 from push_ros.qos import COMMAND, LATCHED
-from push_ros.scenario import load_scenario
+from push_scenario.scenario import load_scenario
+from push_study.graph_run import LockstepRun
+from push_study.observer import final_errors
 from tf2_msgs.msg import TFMessage
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
@@ -66,7 +67,7 @@ def pushing(run):
     run.observer.send_goal(run.scenario.goal)
     assert run.spin_until(
         lambda: (
-            run.observer.state.state == SupervisorState.PUSHING
+            run.observer.state.state == JobState.PUSHING
             and run.observer.trace.object[-1][0] > -0.40
         ),
         60.0,
@@ -82,7 +83,7 @@ def moved(run, seconds):
 
 def ends(run, limit=120.0):
     """Run until the job has ended; its state."""
-    assert run.spin_until(lambda: run.observer.state.state == SupervisorState.IDLE, limit)
+    assert run.spin_until(lambda: run.observer.state.state == JobState.IDLE, limit)
     return run.observer.state
 
 
@@ -119,7 +120,7 @@ class Outsider(Node):
         self.texts, self.maps, self.paths, self.tfs, self.markers = [], [], [], [], []
         self.commands = []
         self.create_subscription(
-            String, "/supervisor/status_text", lambda m: self.texts.append(m.data), LATCHED
+            String, "/status_text", lambda m: self.texts.append(m.data), LATCHED
         )
         self.create_subscription(OccupancyGrid, "/map", self.maps.append, LATCHED)
         self.create_subscription(Path, "/push_path", self.paths.append, LATCHED)
@@ -127,7 +128,7 @@ class Outsider(Node):
         self.create_subscription(MarkerArray, "/visualization", self.markers.append, 10)
         self.create_subscription(TwistStamped, "/epuck1/cmd_vel", self.commands.append, COMMAND)
         self.goals = self.create_publisher(PoseStamped, "/goal_pose", 10)
-        self.cancel = self.create_client(Trigger, "/supervisor/cancel")
+        self.cancel = self.create_client(Trigger, "/cancel")
 
 
 def test_standard_messages_are_enough():
@@ -145,7 +146,7 @@ def test_standard_messages_are_enough():
         # inside the arena's wall
         me.goals.publish(pose_stamped_to_ros(np.array([1.49, 0.0, 0.0]), 0.0))
         assert run.spin_until(lambda: any("obstacle" in t for t in me.texts), 5.0), me.texts
-        assert run.observer.state.state == SupervisorState.IDLE
+        assert run.observer.state.state == JobState.IDLE
         # outside the map
         me.goals.publish(pose_stamped_to_ros(np.array([9.0, 0.0, 0.0]), 0.0))
         assert run.spin_until(lambda: any("outside the map" in t for t in me.texts), 5.0)
@@ -200,14 +201,13 @@ def test_nan_poses_stop_the_robot_and_good_ones_let_it_go_on(short):
 
     def change(message):
         if short.bridge.time < until:
-            for named in message.poses:
-                named.pose.position.x = float("nan")
+            message.x = [float("nan")] * len(message.names)
         return [message]
 
     tamper(short, change)
     moved(short, 0.3)
     assert moved(short, 0.5) < 1e-3
-    assert short.controller._poses.refused > 20
+    assert short.controller._poses.gate.refused > 20
     assert ends(short).error_code == 0
     assert final_errors(short.observer.trace, short.scenario.goal)[0] < 0.02
 
@@ -235,13 +235,12 @@ def test_jumped_pose_is_not_chased(short):
     def change(message):
         count[0] += 1
         if count[0] % 40 < 8:
-            for named in message.poses:
-                named.pose.position.x = named.pose.position.y = 0.0
+            message.x = message.y = [0.0] * len(message.names)
         return [message]
 
     tamper(short, change)
     assert ends(short).error_code == 0
-    assert short.controller._poses.jumps > 50
+    assert short.controller._poses.gate.jumps > 50
     assert final_errors(short.observer.trace, short.scenario.goal)[0] < 0.02
 
 
@@ -252,9 +251,8 @@ def test_frozen_poses_end_the_push(short):
 
     def change(message):
         if not held:
-            held.extend(n.pose for n in message.poses)
-        for named, pose in zip(message.poses, held, strict=True):
-            named.pose = pose
+            held.extend([message.x, message.y, message.theta])
+        message.x, message.y, message.theta = held
         return [message]
 
     tamper(short, change)
@@ -275,9 +273,7 @@ def test_object_taken_away_is_noticed_and_replanned(short):
 def test_object_moved_before_the_push_is_noticed(short):
     short.observer.send_goal(short.scenario.goal)
     assert short.spin_until(
-        lambda: (
-            short.observer.state.state == SupervisorState.POSITIONING and short.bridge.time > 1.0
-        ),
+        lambda: short.observer.state.state == JobState.POSITIONING and short.bridge.time > 1.0,
         20.0,
     )
     short.bridge.world.objects["box"].place(np.array([-0.45, 0.3, 0.0]))

@@ -11,18 +11,12 @@ import pytest
 import yaml
 from mcap.reader import make_reader
 
-from push_bringup.bag import bag_file, read_bag
 from push_bringup.launcher import Child, Launcher, single_robot
 from push_bringup.monitor import Monitor
-from push_msgs.msg import SupervisorState
-from push_ros.process import claim_domain
+from push_msgs.msg import JobState
+from push_record.bag import bag_file, read_bag
 
 FACTOR = ["--ros", "-p", "real_time_factor:=3.0"]
-
-
-@pytest.fixture
-def domain():
-    claim_domain()
 
 
 def alive(group):
@@ -39,8 +33,8 @@ def standstill(bag, sign, limit):
         if record.topic == sign:
             last = max(last, stamp)
         else:
-            (pose,) = [p.pose for p in record.message.poses if p.name == "epuck1"]
-            truth.append((stamp, pose.position.x, pose.position.y))
+            place = list(record.message.names).index("epuck1")
+            truth.append((stamp, record.message.x[place], record.message.y[place]))
     table = np.array(truth)
     moving = table[(table[:, 0] > last - 0.5) & (table[:, 0] <= last)]
     assert np.hypot(*(moving[-1] - moving[0])[1:]) > 0.01, "it was to be killed on the move"
@@ -88,7 +82,7 @@ def test_killed_node(domain, victim, respawn, tmp_path):
         covered, way = standstill(tmp_path / "bag", sign, limit)
         assert covered > 1.5 and way < 1e-3  # it rocks by 0.2 mm
     topics = {r.topic for r in read_bag(tmp_path / "bag")}
-    assert {"/poses", "/epuck1/cmd_vel", "/supervisor/state"} <= topics
+    assert {"/poses", "/epuck1/cmd_vel", "/job_state"} <= topics
 
 
 def test_a_planner_killed_at_work_is_asked_again(domain):
@@ -102,7 +96,7 @@ def test_a_planner_killed_at_work_is_asked_again(domain):
             (child,) = [c for c in launcher.children if c.name == "planner"]
             child.process.send_signal(signal.SIGSTOP)  # it takes the request but never answers
             monitor.send_goal((0.1, 0.04, 0.1))
-            assert monitor.wait(10.0, lambda: monitor.state.state == SupervisorState.PLANNING)
+            assert monitor.wait(10.0, lambda: monitor.state.state == JobState.PLANNING)
             monitor.wait(0.5, lambda: False)
             child.process.send_signal(signal.SIGKILL)
             assert monitor.follow(90.0, lambda: launcher.check() is not None) == 0, monitor.state
@@ -120,7 +114,7 @@ def test_signals_at_random_moments(domain, number, seed, tmp_path):
         [
             sys.executable,
             "-m",
-            "push_bringup.cli",
+            "planar_push.cli",
             "launch",
             "single",
             "--scenario",
@@ -157,7 +151,7 @@ def test_signals_end_a_demo(domain, number, tmp_path):
     """FAULTS 18, in the middle of a push."""
     words = ["demo", "--scenario", "short", "--out", str(tmp_path / "demo")]
     process = subprocess.Popen(
-        [sys.executable, "-m", "push_bringup.cli", *words],
+        [sys.executable, "-m", "planar_push.cli", *words],
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         text=True,
@@ -214,7 +208,7 @@ def test_a_wrong_parameter_on_the_command_line_is_an_error_not_a_traceback(domai
     """FAULTS 20."""
     words = ["node", "bridge", "--scenario", "short", "--ros", "-p", f"real_time_factor:={value}"]
     done = subprocess.run(
-        [sys.executable, "-m", "push_bringup.cli", *words],
+        [sys.executable, "-m", "planar_push.cli", *words],
         capture_output=True,
         text=True,
         timeout=60,
@@ -250,7 +244,7 @@ def test_demo_ends_with_bag_pictures_and_report(domain, tmp_path):
         [
             sys.executable,
             "-m",
-            "push_bringup.cli",
+            "planar_push.cli",
             "demo",
             "--scenario",
             "short",
@@ -277,7 +271,7 @@ def test_goal_ends_with_the_suite(domain):
     try:
         words = ["goal", "0.1", "0.04", "0.1"]
         process = subprocess.Popen(
-            [sys.executable, "-m", "push_bringup.cli", *words],
+            [sys.executable, "-m", "planar_push.cli", *words],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -294,7 +288,7 @@ def test_goal_ends_with_the_suite(domain):
 
 def test_wrong_words_are_answered_with_what_to_do():
     done = subprocess.run(
-        [sys.executable, "-m", "push_bringup.cli", "launch", "single", "--scenario", "atlantis"],
+        [sys.executable, "-m", "planar_push.cli", "launch", "single", "--scenario", "atlantis"],
         capture_output=True,
         text=True,
         timeout=60,

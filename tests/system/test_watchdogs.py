@@ -10,9 +10,9 @@ from rclpy.action import ActionClient
 
 from push_model import line
 from push_msgs.action import FollowTrajectory
-from push_msgs.msg import NamedPose, NamedPoses
+from push_msgs.msg import Poses
 from push_ros.conversions import (
-    pose_to_ros,
+    poses_to_ros,
     time_from_ros,
     time_to_ros,
     trajectory_to_ros,
@@ -20,7 +20,7 @@ from push_ros.conversions import (
 )
 from push_ros.process import Spinner
 from push_ros.qos import COMMAND, STREAM
-from push_ros.scenario import load_scenario
+from push_scenario.scenario import load_scenario
 
 PLACE = np.array([-0.7, 0.0, 0.0])
 
@@ -54,7 +54,7 @@ class Stream:
 
     def __init__(self, node, spinner):
         self.node, self.spinner, self.tick = node, spinner, 100
-        self.poses = node.create_publisher(NamedPoses, "/poses", STREAM)
+        self.poses = node.create_publisher(Poses, "/poses", STREAM)
         self.commands = []
         node.create_subscription(TwistStamped, "/epuck1/cmd_vel", self.commands.append, COMMAND)
         self.client = ActionClient(node, FollowTrajectory, "/epuck1/follow_trajectory")
@@ -62,9 +62,7 @@ class Stream:
     def send(self, ticks, names=("epuck1", "box")):
         for _ in range(ticks):
             self.tick += 1
-            frame = NamedPoses(poses=[NamedPose(name=n, pose=pose_to_ros(PLACE)) for n in names])
-            frame.header.frame_id = "map"
-            frame.header.stamp = time_to_ros(0.01 * self.tick)
+            frame = poses_to_ros(dict.fromkeys(names, PLACE), 0.01 * self.tick)
             self.poses.publish(frame)
             answered = lambda: (  # noqa: E731
                 self.commands
@@ -81,7 +79,7 @@ class Stream:
 def stream(node):
     from push_mpc.node import ControllerNode
 
-    controller = ControllerNode(load_scenario("short"))
+    controller = ControllerNode(load_scenario("short"), "epuck1")
     spinner = Spinner([controller, node])
     stream = Stream(node, spinner)
     stream.controller = controller

@@ -1,0 +1,161 @@
+"""From a stream of tracked poses to poses that may be acted on. No ROS here.
+
+Policy on stamps: zero is refused, and so is one that is not newer than the last. A gap forward
+beyond ``timeout`` counts as an interruption of the stream. One that lies back by more than
+``reset_gap``, or ahead by more than ``leap``, is refused too, until the stream persists there: then
+it counts as a reset of the clock, or as an interruption.
+"""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from push_model import se2
+from push_model.arrays import Array
+from push_model.settings import bounded, settings
+
+
+@settings
+class PoseGateSettings:
+    """When a pose is too old or too far."""
+
+    timeout: float = bounded(0.15, low=0.01, high=5.0, doc="[s] age at which a pose is stale")
+    max_speed: float = bounded(0.5, low=0.01, high=20.0, doc="[m/s] a body can plausibly move")
+    max_turn_rate: float = bounded(10.0, low=0.1, high=100.0, doc="[rad/s] it can plausibly turn")
+    jump_margin: float = bounded(0.02, low=0.0, high=1.0, doc="[m] allowed beyond max_speed")
+    turn_margin: float = bounded(0.2, low=0.0, high=3.2, doc="[rad] allowed beyond max_turn_rate")
+    persistence: int = bounded(
+        10, low=1, high=1000, doc="frames a jumped pose must persist before it is believed"
+    )
+    reset_gap: float = bounded(0.5, low=0.01, high=60.0, doc="[s] back in time that means a reset")
+    leap: float = bounded(10.0, low=0.1, high=3600.0, doc="[s] ahead that a stamp is not believed")
+    stamp_persistence: int = bounded(
+        3, low=1, high=1000, doc="frames in a row that make a reset, or a leap, believed"
+    )
+
+
+class Stamp(Enum):
+    """Verdict on a frame's stamp."""
+
+    OK = "ok"
+    REFUSED = "refused"
+    RESET = "reset"
+    RESUMED = "resumed"
+
+
+@dataclass
+class _Body:
+    pose: Array
+    stamp: float
+    candidate: Array | None = None
+    repeats: int = 0
+
+
+class PoseGate:
+    """Gates the poses of named bodies.
+
+    bodies: whose poses are kept; all, when None. Counters: refused (non-finite pose or bad stamp),
+    jumps (gated poses). refusal: why the last stamp was refused.
+    """
+
+    def __init__(
+        self, settings: PoseGateSettings | None = None, bodies: Collection[str] | None = None
+    ) -> None:
+        self.settings = settings or PoseGateSettings()
+        self.bodies = None if bodies is None else frozenset(bodies)
+        self.refused = 0
+        self.jumps = 0
+        self.refusal = ""
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all bodies and the clock."""
+        self.stamp = 0.0
+        self._elsewhere = 0.0  # newest stamp of a stream that may have moved there
+        self._frames_elsewhere = 0
+        self._bodies: dict[str, _Body] = {}
+
+    def begin(self, stamp: float) -> Stamp:
+        """Judge the stamp [s] of a frame; ``accept`` is for the poses of accepted frames only."""
+        s = self.settings
+        if not np.isfinite(stamp) or stamp <= 0.0:
+            return self._refuse(f"its stamp is {stamp:g}")
+        ahead = stamp - self.stamp
+        verdict = Stamp.OK
+        if self.stamp > 0.0:
+            if ahead < -s.reset_gap or ahead > s.leap:
+                if not self._persists(stamp):
+                    return self._refuse(f"its stamp lies {ahead:+.2f} s from the last one")
+                verdict = Stamp.RESET if ahead < 0.0 else Stamp.RESUMED
+            elif ahead <= 0.0:
+                return self._refuse("its stamp is not newer than the last")
+            elif ahead > s.timeout:
+                verdict = Stamp.RESUMED
+        if verdict is Stamp.RESET:
+            self.reset()
+        self.stamp = stamp
+        self._frames_elsewhere = 0
+        return verdict
+
+    def _persists(self, stamp: float) -> bool:
+        """Whether the stream has gone on from a far-off stamp for long enough."""
+        follows = 0.0 < stamp - self._elsewhere <= self.settings.timeout
+        self._frames_elsewhere = self._frames_elsewhere + 1 if follows else 1
+        self._elsewhere = stamp
+        return self._frames_elsewhere >= self.settings.stamp_persistence
+
+    def _refuse(self, why: str) -> Stamp:
+        self.refused += 1
+        self.refusal = why
+        return Stamp.REFUSED
+
+    def accept(self, name: str, pose: Array) -> bool:
+        """Offer a pose ``(3,)`` of this frame; False when it is refused, gated or not wanted."""
+        if self.bodies is not None and name not in self.bodies:
+            return False
+        if not np.isfinite(pose).all():
+            self.refused += 1
+            return False
+        body = self._bodies.get(name)
+        if body is None:
+            self._bodies[name] = _Body(pose, self.stamp)
+            return True
+        s = self.settings
+        # Long unseen is not a licence to be anywhere: the allowance stops growing.
+        elapsed = min(self.stamp - body.stamp, 4.0 * s.timeout)
+        if self._close(body.pose, pose, elapsed):
+            self._bodies[name] = _Body(pose, self.stamp)
+            return True
+        self.jumps += 1
+        if body.candidate is not None and self._close(body.candidate, pose, s.timeout):
+            body.repeats += 1
+        else:
+            body.repeats = 1
+        body.candidate = pose
+        if body.repeats >= s.persistence:
+            self._bodies[name] = _Body(pose, self.stamp)
+            return True
+        return False
+
+    def _close(self, first: Array, second: Array, elapsed: float) -> bool:
+        s = self.settings
+        way = float(np.hypot(*(second - first)[:2]))
+        turn = abs(se2.wrap(float(second[2] - first[2])))
+        return (
+            way <= s.max_speed * elapsed + s.jump_margin
+            and turn <= s.max_turn_rate * elapsed + s.turn_margin
+        )
+
+    def pose(self, name: str) -> Array | None:
+        """The last accepted pose, None when there is none or it is stale."""
+        body = self._bodies.get(name)
+        if body is None or self.stamp - body.stamp > self.settings.timeout:
+            return None
+        return body.pose
+
+    def age(self, name: str) -> float:
+        """[s] since the last accepted pose; inf when there is none."""
+        body = self._bodies.get(name)
+        return float("inf") if body is None else self.stamp - body.stamp

@@ -1,0 +1,32 @@
+"""How the job of moving an object can end, whoever does it: one robot, a group or a swarm."""
+
+from enum import IntEnum
+
+
+class JobError(IntEnum):
+    """The codes of the MoveObject action and of JobState."""
+
+    NONE = 0
+    INVALID_GOAL = 301
+    UNKNOWN_OBJECT = 302
+    UNKNOWN_FRAME = 303
+    OUTSIDE_MAP = 304
+    GOAL_OCCUPIED = 305
+    PLANNING_FAILED = 306
+    POSITIONING_FAILED = 307
+    EXECUTION_FAILED = 308
+    POSES_STALE = 309
+    CANCELED = 310
+    PREEMPTED = 311
+    OFF_TARGET = 312
+    CLOCK_RESET = 313
+    NODE_LOST = 314
+    TOO_HEAVY = 315
+
+
+class GoalRefused(Exception):
+    """A goal that cannot be taken; carries the code."""
+
+    def __init__(self, code: JobError, message: str) -> None:
+        super().__init__(message)
+        self.code = code

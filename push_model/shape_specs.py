@@ -1,0 +1,111 @@
+"""Shapes as files write them: ``{rectangle: {length: 0.09, width: 0.09}}``, told by their key.
+
+``{kind: rectangle, length: 0.09, width: 0.09}`` says the same.
+"""
+
+from collections.abc import Mapping
+from dataclasses import field
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BeforeValidator
+
+from push_model.settings import SettingsError, bounded, from_mapping, settings
+from push_model.shapes import Shape, ellipse, flower, polygon, rectangle
+
+
+@settings
+class RectangleShape:
+    """A rectangle; its frame is in the middle."""
+
+    kind: Literal["rectangle"] = field(default="rectangle", kw_only=True)
+    length: float = bounded(low=1e-4, high=100.0, doc="[m] along x")
+    width: float = bounded(low=1e-4, high=100.0, doc="[m] along y")
+
+    def shape(self) -> Shape:
+        """The shape."""
+        return rectangle(self.length, self.width)
+
+
+@settings
+class PolygonShape:
+    """A simple polygon, convex or not; its frame is moved to the centroid of its area."""
+
+    kind: Literal["polygon"] = field(default="polygon", kw_only=True)
+    vertices: tuple[tuple[float, float], ...] = bounded(
+        low=-100.0, high=100.0, doc="[m] in order, either way round"
+    )
+
+    def __post_init__(self) -> None:
+        self.shape()
+
+    def shape(self) -> Shape:
+        """The shape."""
+        return polygon(np.array(self.vertices))
+
+
+@settings
+class EllipseShape:
+    """An ellipse; its frame is in the middle."""
+
+    kind: Literal["ellipse"] = field(default="ellipse", kw_only=True)
+    semi_axis_x: float = bounded(low=1e-4, high=100.0, doc="[m]")
+    semi_axis_y: float = bounded(low=1e-4, high=100.0, doc="[m]")
+
+    def shape(self) -> Shape:
+        """The shape."""
+        return ellipse(self.semi_axis_x, self.semi_axis_y)
+
+
+@settings
+class FlowerShape:
+    """r(phi) = radius + amplitude cos(petals phi)."""
+
+    kind: Literal["flower"] = field(default="flower", kw_only=True)
+    radius: float = bounded(low=1e-4, high=100.0, doc="[m]")
+    amplitude: float = bounded(low=0.0, high=100.0, doc="[m]")
+    petals: int = bounded(low=2, high=60, doc="how many")
+
+    def __post_init__(self) -> None:
+        self.shape()
+
+    def shape(self) -> Shape:
+        """The shape."""
+        return flower(self.radius, self.amplitude, self.petals)
+
+
+_KINDS = ("rectangle", "polygon", "ellipse", "flower")
+
+
+def _told_by_kind(value: Any) -> Any:
+    """``{rectangle: {...}}`` as ``{kind: rectangle, ...}``."""
+    if not isinstance(value, Mapping):
+        if type(value) in (RectangleShape, PolygonShape, EllipseShape, FlowerShape):
+            return value
+    elif "kind" in value:
+        return value
+    elif len(value) == 1:
+        ((kind, inner),) = value.items()
+        if kind in _KINDS and isinstance(inner, Mapping) and "kind" not in inner:
+            return {"kind": kind, **inner}
+    raise SettingsError(f"expected one key of {', '.join(_KINDS)} with a mapping, got {value!r}")
+
+
+ShapeSpec = Annotated[
+    RectangleShape | PolygonShape | EllipseShape | FlowerShape, BeforeValidator(_told_by_kind)
+]
+
+
+@settings
+class _Shaped:
+    shape: ShapeSpec
+
+
+def shape_from_mapping(values: Any) -> Shape:
+    """The shape of parsed YAML.
+
+    Raises
+    ------
+    SettingsError: no known kind, wrong sizes; says which and what was expected.
+    """
+    return from_mapping(_Shaped, {"shape": values}, "").shape.shape()

@@ -1,0 +1,1 @@
+"""Bags: what is recorded, how it is written, and how it is read."""

@@ -1,0 +1,214 @@
+"""Bags: rosbag2 folders with one MCAP file, written in small chunks so that a killed writer loses
+little, readable by rosbag2, Foxglove, the ``rosbags`` and the ``mcap`` libraries."""
+
+import contextlib
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+from mcap.exceptions import McapError
+from mcap.records import Channel, Message, Metadata, Schema
+from mcap.stream_reader import StreamReader
+from mcap.writer import CompressionType, Writer
+
+from push_record.interfaces import typestore
+
+_CHUNK = 64 * 1024  # [bytes]
+_FLUSH_EVERY = 1.0  # [s] wall time
+_MAXIMUM = {"sec": 9223372036, "nsec": 854775807}
+
+
+@dataclass
+class _Topic:
+    type: str
+    channel: int
+    latched: bool
+    count: int = 0
+
+
+class BagWriter:
+    """Writes one bag. ``metadata`` (scenario, seed, revision) goes inside the file."""
+
+    def __init__(self, folder: Path, metadata: Mapping[str, str]) -> None:
+        """Raises FileExistsError when the folder is there already."""
+        folder.mkdir(parents=True)
+        self.folder = folder
+        self._file = (folder / f"{folder.name}_0.mcap").open("wb")
+        self._writer = Writer(self._file, chunk_size=_CHUNK, compression=CompressionType.NONE)
+        self._writer.start("ros2", "planar-push")
+        self._writer.add_metadata("planar_push", dict(metadata))
+        self._metadata = dict(metadata)
+        self._store = typestore()
+        self._topics: dict[str, _Topic] = {}
+        self._first = self._last = 0
+        self._flushed = time.monotonic()
+        self._sequence = 0
+        self.closed = False
+
+    def add_topic(self, topic: str, message_type: str, latched: bool) -> None:
+        """Register a topic, e.g. type ``push_msgs/msg/Poses``."""
+        definition, _ = self._store.generate_msgdef(message_type, ros_version=2)
+        schema = self._writer.register_schema(message_type, "ros2msg", definition.encode())
+        qos = yaml.safe_dump([_qos(latched)])
+        channel = self._writer.register_channel(topic, "cdr", schema, {"offered_qos_profiles": qos})
+        self._topics[topic] = _Topic(message_type, channel, latched)
+
+    def write(self, topic: str, stamp: int, data: bytes) -> None:
+        """Append a serialised message with its log time [ns]."""
+        entry = self._topics[topic]
+        self._sequence += 1
+        self._writer.add_message(entry.channel, stamp, data, stamp, self._sequence)
+        entry.count += 1
+        self._first = min(self._first, stamp) if self._sequence > 1 else stamp
+        self._last = max(self._last, stamp)
+        now = time.monotonic()
+        if now - self._flushed > _FLUSH_EVERY:
+            self._flushed = now
+            self._writer.flush()
+            self._file.flush()
+            self._write_metadata()
+
+    def close(self) -> None:
+        """Finish the file; safe to call twice."""
+        if self.closed:
+            return
+        self.closed = True
+        self._writer.finish()
+        self._file.close()
+        self._write_metadata()
+
+    def abandon(self) -> None:
+        """Stop writing where nothing more can be written; whole chunks stay readable."""
+        self.closed = True
+        with contextlib.suppress(OSError):
+            self._file.close()
+
+    def _write_metadata(self) -> None:
+        topics = [
+            {
+                "topic_metadata": {
+                    "name": name,
+                    "type": t.type,
+                    "serialization_format": "cdr",
+                    "offered_qos_profiles": [_qos(t.latched)],
+                    "type_description_hash": self._store.hash_rihs01(t.type),
+                },
+                "message_count": t.count,
+            }
+            for name, t in self._topics.items()
+        ]
+        total = sum(t.count for t in self._topics.values())
+        duration = {"nanoseconds": max(0, self._last - self._first)}
+        start = {"nanoseconds_since_epoch": self._first}
+        name = f"{self.folder.name}_0.mcap"
+        information = {
+            "version": 9,
+            "storage_identifier": "mcap",
+            "duration": duration,
+            "starting_time": start,
+            "message_count": total,
+            "topics_with_message_count": topics,
+            "compression_format": "",
+            "compression_mode": "",
+            "relative_file_paths": [name],
+            "files": [
+                {"path": name, "starting_time": start, "duration": duration, "message_count": total}
+            ],
+            "custom_data": self._metadata,
+            "ros_distro": "jazzy",
+        }
+        text = yaml.safe_dump({"rosbag2_bagfile_information": information}, sort_keys=False)
+        temporary = self.folder / ".metadata.yaml"
+        temporary.write_text(text)
+        temporary.replace(self.folder / "metadata.yaml")
+
+
+def _qos(latched: bool) -> dict[str, Any]:
+    return {
+        "history": "keep_last",
+        "depth": 1 if latched else 10,
+        "reliability": "reliable",
+        "durability": "transient_local" if latched else "volatile",
+        "deadline": _MAXIMUM,
+        "lifespan": _MAXIMUM,
+        "liveliness": "automatic",
+        "liveliness_lease_duration": _MAXIMUM,
+        "avoid_ros_namespace_conventions": False,
+    }
+
+
+@dataclass(frozen=True)
+class Record:
+    """A message of a bag: topic, log time [ns], message as a rosbags dataclass."""
+
+    topic: str
+    stamp: int
+    message: Any
+
+
+def bag_file(bag: Path) -> Path:
+    """The MCAP file of a bag folder, or the path itself."""
+    if bag.is_file():
+        return bag
+    files = sorted(bag.glob("*.mcap"))
+    if not files:
+        raise FileNotFoundError(f"{bag}: no .mcap file in it")
+    return files[0]
+
+
+def read_metadata(bag: Path) -> dict[str, str]:
+    """Scenario, seed and revision of a bag."""
+    for record in _records(bag):
+        if isinstance(record, Metadata) and record.name == "planar_push":
+            return dict(record.metadata)
+    return {}
+
+
+def _records(bag: Path) -> Iterator[Any]:
+    """All records, up to where a cut-off file ends."""
+    with bag_file(bag).open("rb") as file:
+        try:
+            yield from StreamReader(file).records
+        except (McapError, EOFError, ValueError):
+            return
+
+
+def read_bag(bag: Path, topics: set[str] | None = None) -> Iterator[Record]:
+    """Messages in file order; a bag whose writer was killed gives what its whole chunks hold."""
+    store = typestore()
+    schemas: dict[int, str] = {}
+    channels: dict[int, tuple[str, str]] = {}
+    for record in _records(bag):
+        if isinstance(record, Schema):
+            schemas[record.id] = record.name
+        elif isinstance(record, Channel):
+            channels[record.id] = (record.topic, schemas[record.schema_id])
+        elif isinstance(record, Message):
+            topic, kind = channels[record.channel_id]
+            if topics is None or topic in topics:
+                yield Record(topic, record.log_time, store.deserialize_cdr(record.data, kind))
+
+
+def recover(bag: Path, folder: Path) -> int:
+    """Copy what can be read of a cut-off bag into a finished one; returns the message count."""
+    writer = BagWriter(folder, read_metadata(bag))
+    schemas: dict[int, str] = {}
+    names: dict[int, str] = {}
+    count = 0
+    try:
+        for record in _records(bag):
+            if isinstance(record, Schema):
+                schemas[record.id] = record.name
+            elif isinstance(record, Channel) and record.id not in names:
+                names[record.id] = record.topic
+                latched = "transient_local" in record.metadata.get("offered_qos_profiles", "")
+                writer.add_topic(record.topic, schemas[record.schema_id], latched)
+            elif isinstance(record, Message):
+                writer.write(names[record.channel_id], record.log_time, record.data)
+                count += 1
+    finally:
+        writer.close()
+    return count

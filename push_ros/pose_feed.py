@@ -1,0 +1,122 @@
+"""The pose stream as a node uses it: validated, gated, watched."""
+
+import struct
+import time
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy._rclpy_pybind11 import RCLError
+from rclpy.node import Node
+from rclpy.serialization import deserialize_message
+from std_msgs.msg import Bool
+
+from push_estimation.pose_gate import PoseGate, PoseGateSettings, Stamp
+from push_model.arrays import Array
+from push_msgs.msg import Poses
+from push_ros.conversions import poses_from_ros, time_from_ros
+from push_ros.diagnostics import Diagnostics
+from push_ros.names import Names
+from push_ros.qos import LATCHED, STREAM
+from push_ros.validation import FRAME, InvalidMessage
+
+
+@dataclass(frozen=True)
+class Frame:
+    """stamp: of the message; verdict on it; seen: bodies whose pose was accepted; elapsed [s] since
+    the frame before, 0 where that is not known."""
+
+    stamp: Any
+    verdict: Stamp
+    seen: frozenset[str]
+    elapsed: float
+
+
+class PoseFeed:
+    """Subscribes to ``poses``; calls ``on_frame`` for each frame, refused ones included."""
+
+    def __init__(
+        self,
+        node: Node,
+        names: Names,
+        settings: PoseGateSettings,
+        bodies: Collection[str],
+        diagnostics: Diagnostics,
+        on_frame: Callable[[Frame], None],
+        period: float = 0.0,
+    ) -> None:
+        """bodies: whose poses are wanted; others are not kept. period: [s] frames that follow the
+        last one sooner are not even deserialised."""
+        self.gate = PoseGate(settings, bodies)
+        self.topic = names.world("poses")
+        self.paused = False
+        self._node = node
+        self._diagnostics = diagnostics
+        self._on_frame = on_frame
+        self._period = period
+        self._last_wall = time.monotonic()
+        node.create_subscription(
+            Poses,
+            self.topic,
+            self._on_data,
+            STREAM,
+            event_callbacks=diagnostics.subscription_events(self.topic),
+            raw=True,
+        )
+        node.create_subscription(Bool, names.world("paused"), self._on_paused, LATCHED)
+        diagnostics.watch_publishers(self.topic)
+
+    @property
+    def stamp(self) -> float:
+        """[s] of the last accepted frame."""
+        return self.gate.stamp
+
+    @property
+    def silence(self) -> float:
+        """[s] wall time without a frame; a pause of the world does not count."""
+        return 0.0 if self.paused else time.monotonic() - self._last_wall
+
+    def pose(self, name: str) -> Array | None:
+        """The last accepted pose ``(3,)``; None when there is none or it is stale."""
+        return self.gate.pose(name)
+
+    def _on_paused(self, message: Bool) -> None:
+        self.paused = bool(message.data)
+        self._last_wall = time.monotonic()
+
+    def _on_data(self, data: bytes) -> None:
+        try:
+            # CDR: four bytes of encapsulation, then the header's stamp.
+            seconds, nanoseconds = struct.unpack_from("<iI", data, 4)
+            if 0.0 <= seconds + 1e-9 * nanoseconds - self.gate.stamp < self._period:
+                return
+            message = deserialize_message(data, Poses)
+        except (struct.error, RuntimeError, RCLError) as error:
+            self._diagnostics.refuse(self.topic, f"unreadable: {error}")
+            return
+        self.take(message)
+
+    def take(self, message: Poses) -> None:
+        """Judge a frame and hand it on."""
+        if message.header.frame_id != FRAME:
+            self._diagnostics.refuse(self.topic, f"frame '{message.header.frame_id}'")
+            return
+        try:
+            poses, refused = poses_from_ros(message, self.gate.bodies)
+        except InvalidMessage as error:
+            self._diagnostics.refuse(self.topic, str(error))
+            return
+        before = self.gate.stamp
+        verdict = self.gate.begin(time_from_ros(message.header.stamp))
+        seen: frozenset[str] = frozenset()
+        if verdict is Stamp.REFUSED:
+            self._diagnostics.refuse(self.topic, self.gate.refusal)
+        else:
+            self._last_wall = time.monotonic()
+            for text in refused:
+                self.gate.refused += 1
+                self._diagnostics.refuse(self.topic, text)
+            seen = frozenset(name for name, pose in poses.items() if self.gate.accept(name, pose))
+        known = verdict is Stamp.OK and before > 0.0
+        elapsed = self.gate.stamp - before if known else 0.0
+        self._on_frame(Frame(message.header.stamp, verdict, seen, elapsed))

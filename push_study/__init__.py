@@ -1,0 +1,1 @@
+"""Studies: whole runs in one process, seeded trials, summaries."""

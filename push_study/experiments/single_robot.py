@@ -1,0 +1,234 @@
+"""Experiments: seeded trials of a system, summary, plots, a bag, the thesis's figure beside."""
+
+import csv
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from push_model import se2
+from push_model.arrays import Array
+from push_planner import DistanceField, PlannerSettings, PushScene
+from push_record.recorder import RecorderNode, revision
+from push_ros.process import claim_domain
+from push_scenario.scenario import Scenario, load_scenario
+from push_study.graph_run import LockstepRun
+from push_study.observer import Trace, final_errors
+from push_study.summary import aggregate
+from push_study.thesis import TABLE_2_1
+from push_study.trials import Row, run_trials
+from push_view.report import draw_map, outlines_of, write_report
+
+SUCCESS_POSITION = 0.02
+"""[m] of the object at the end."""
+SUCCESS_ORIENTATION = 0.1
+"""[rad]."""
+
+
+@dataclass(frozen=True)
+class SingleRobotTask:
+    """One trial. Noise in [m], [rad], [Hz], [s]; spread: relative, of every friction."""
+
+    scenario: str
+    seed: int
+    out: str
+    position_noise: float = 2e-4
+    orientation_noise: float = 0.0017453
+    rate: float = 100.0
+    latency: float = 0.01
+    spread: float = 0.2
+    record: bool = False
+
+    @property
+    def trace_file(self) -> Path:
+        """Where the trial leaves its trace; a scenario may be named by a path."""
+        return Path(self.out) / f"trace-{Path(self.scenario).stem}-{self.seed}.npz"
+
+
+def draw_world(task: SingleRobotTask) -> tuple[Scenario, Scenario, Row]:
+    """What the controller believes, what the world is, and the drawn values."""
+    believed = load_scenario(task.scenario)
+    believed = believed.settings(
+        "bridge",
+        seed=task.seed,
+        motion_capture__position_noise=task.position_noise,
+        motion_capture__orientation_noise=task.orientation_noise,
+        motion_capture__rate=task.rate,
+        motion_capture__latency=task.latency,
+    ).settings("controller", tracker__pose_delay=task.latency)
+    random = np.random.default_rng(task.seed)
+    objects = {}
+    drawn: Row = {}
+    for name, (spec, start) in believed.objects.items():
+        floor, contact = random.uniform(1.0 - task.spread, 1.0 + task.spread, 2)
+        changed = replace(
+            spec,
+            floor_friction=spec.floor_friction * float(floor),
+            contact_friction=spec.contact_friction * float(contact),
+        )
+        objects[name] = (changed, start)
+        drawn[f"{name}_floor_friction"] = changed.floor_friction
+        drawn[f"{name}_contact_friction"] = changed.contact_friction
+    robots = {}
+    for name, (robot, start) in believed.robots.items():
+        grip = float(random.uniform(1.0 - task.spread, 1.0 + task.spread))
+        drive = robot.drive
+        drive = replace(drive, wheel_friction=drive.wheel_friction * grip)
+        robots[name] = (replace(robot, drive=drive), start)
+        drawn[f"{name}_wheel_friction"] = drive.wheel_friction
+    return believed, replace(believed, objects=objects, robots=robots), drawn
+
+
+def min_clearance(scenario: Scenario, trace: Trace) -> float:
+    """[m] least clearance of robot and object over a run, from ground truth, every 0.1 s."""
+    _, robot = scenario.robot()
+    _, item = scenario.object()
+    scene = PushScene(DistanceField(scenario.grid), robot, item, PlannerSettings())
+    least = min(
+        (
+            min(scene.robot_clearance(r), scene.object_clearance(o))
+            for r, o in zip(trace.robot[::10], trace.object[::10], strict=False)
+        ),
+        default=float("nan"),
+    )
+    return float(least)
+
+
+def single_robot_trial(task: SingleRobotTask) -> Row:
+    """Push the object to the scenario's goal once."""
+    claim_domain()
+    believed, world, drawn = draw_world(task)
+    if believed.goal is None:
+        raise ValueError(f"scenario '{task.scenario}' has no goal")
+    folder = Path(task.out)
+    folder.mkdir(parents=True, exist_ok=True)  # on a machine of a cluster, perhaps
+
+    def extra() -> list[Any]:
+        return [RecorderNode(folder / "bag", believed, task.seed)] if task.record else []
+
+    with LockstepRun(believed, extra, world=world, quiet=True) as run:
+        run.start()
+        state = run.reach(believed.goal)
+        trace = run.observer.trace
+        duration = run.bridge.time
+    if task.record:
+        write_report(folder / "bag", folder / "report")
+    position, orientation = final_errors(trace, believed.goal)
+    reached = state is not None and state.error_code == 0
+    success = (
+        reached
+        and position <= SUCCESS_POSITION
+        and orientation <= SUCCESS_ORIENTATION
+        and trace.collisions == 0
+    )
+    np.savez_compressed(
+        task.trace_file,
+        time=np.array(trace.time[::10]),
+        robot=np.array(trace.robot[::10]),
+        object=np.array(trace.object[::10]),
+    )
+    return {
+        "scenario": task.scenario,
+        "seed": task.seed,
+        "success": success,
+        "reason": "no end within the time limit" if state is None else state.reason,
+        "position_error_m": position,
+        "orientation_error_rad": orientation,
+        "duration_s": duration,
+        "pushes": trace.pushes,
+        "contact_losses": trace.contact_losses,
+        "plan_time_s": trace.plan_time,
+        "min_clearance_m": min_clearance(believed, trace),
+        "collisions": trace.collisions,
+        "replans": 0 if state is None else int(state.replans),
+        **drawn,
+    }
+
+
+def single_robot(
+    scenarios: list[str], trials: int, seed: int, out: Path, scheduler: str = "", workers: int = 0
+) -> dict[str, Any]:
+    """Section 2.6, Table 2.1, with noise and uncertain friction. Writes everything into ``out``."""
+    out.mkdir(parents=True, exist_ok=True)
+    tasks = [
+        SingleRobotTask(name, seed + i, str(out), record=(i == 0 and j == 0))
+        for j, name in enumerate(scenarios)
+        for i in range(trials)
+    ]
+    for name in ("bag", "trials.jsonl"):
+        if (out / name).exists():
+            raise FileExistsError(f"{out}/{name} is there already; choose another --out")
+    rows = run_trials(single_robot_trial, tasks, out / "trials.jsonl", scheduler, workers)
+    summary = {
+        "experiment": "single-robot",
+        "seed": seed,
+        "revision": revision(),
+        "requested": len(tasks),
+        "trials": rows,
+        "aggregate": aggregate(rows),
+    }
+    (out / "summary.json").write_text(json.dumps(summary, indent=1) + "\n")
+    if rows:
+        keys = list(dict.fromkeys(k for r in rows for k in r))
+        with (out / "trials.csv").open("w", newline="") as file:
+            writer = csv.DictWriter(file, keys)
+            writer.writeheader()
+            writer.writerows(rows)
+        for name in scenarios:
+            files = [t.trace_file for t in tasks if t.scenario == name]
+            _plot(name, [r for r in rows if r["scenario"] == name], files, out)
+    _print_table(rows, scenarios)
+    return summary
+
+
+def _print_table(rows: list[Row], scenarios: list[str]) -> None:
+    print("\nscenario        success   position error [mm]        orientation error [rad]")
+    print("                          mean   std   max  thesis     mean    std     max   thesis")
+    for name in scenarios:
+        count = sum(r["scenario"] == name for r in rows)
+        wins = sum(r["scenario"] == name and bool(r["success"]) for r in rows)
+        mine = [r for r in rows if r["scenario"] == name and "position_error_m" in r]
+        if not mine:
+            print(f"{name:15s} {wins:3d}/{count:<3d}")
+            continue
+        p = 1e3 * np.array([r["position_error_m"] for r in mine])
+        o = np.array([r["orientation_error_rad"] for r in mine])
+        known = TABLE_2_1.get(name)
+        tp = f"{1e3 * known[0]:.1f}/{1e3 * known[1]:.1f}" if known else "-"
+        to = f"{known[2]:.3f}/{known[3]:.3f}" if known else "-"
+        print(
+            f"{name:15s} {wins:3d}/{count:<3d}  {p.mean():6.2f}{p.std():6.2f}{p.max():6.2f} "
+            f"{tp:>9s}   {o.mean():.4f} {o.std():.4f} {o.max():.4f} {to:>11s}"
+        )
+    print("(thesis: mean/worst of Table 2.1, real robots)")
+
+
+def _plot(name: str, rows: list[Row], traces: list[Path], out: Path) -> None:
+    scenario = load_scenario(name)
+    figure, axes = plt.subplots(figsize=(9, 6))
+    draw_map(axes, scenario)
+    outlines = outlines_of(scenario)
+    item = next(iter(scenario.objects))
+    good_seeds = {r["seed"] for r in rows if r["success"]}
+    for path in traces:
+        if path.is_file():
+            way: Array = np.load(path)["object"]
+            good = int(path.stem.rsplit("-", 1)[1]) in good_seeds
+            axes.plot(
+                way[:, 0], way[:, 1], lw=0.8, alpha=0.7, color="#2a62c9" if good else "#c22f3d"
+            )
+            axes.fill(*se2.transform(way[-1], outlines[item][0]).T, fill=False, lw=0.7)
+    if scenario.goal is not None:
+        axes.fill(
+            *se2.transform(scenario.goal, outlines[item][0]).T, fill=False, lw=1.6, color="#c22f3d"
+        )
+    axes.set_title(f"{scenario.name}: {len(good_seeds)} of {len(rows)} trials succeed")
+    figure.savefig(out / f"{scenario.name}.png", dpi=130, bbox_inches="tight")
+    plt.close(figure)

@@ -1,0 +1,1 @@
+"""What a person sees: reports from bags, and a live view."""
