@@ -11,7 +11,6 @@ from std_msgs.msg import Header
 
 from push_estimation.pose_gate import PoseGateSettings, Stamp
 from push_model.arrays import Array
-from push_model.kinematics import unicycle_step
 from push_model.settings import SettingsError
 from push_mpc import (
     Push,
@@ -215,6 +214,7 @@ class ControllerNode(Node):
         if tracker.active and self._heartbeat.lost:
             self._end(FollowTrajectory.Result.PREEMPTED, "the supervisor is gone")
         if not tracker.active:
+            tracker.rest(dt)
             self._publish_command(0.0, 0.0)
             self._publish_status(None)
             return
@@ -226,9 +226,8 @@ class ControllerNode(Node):
             return
         self._held = 0.0
         age = self._poses.gate.age(self.robot)
-        if age > 0.0:  # dead reckoning over a drop-out
-            robot = unicycle_step(robot, tracker.v, tracker.omega, age)
-        tick = tracker.tick(dt, robot, item if self._object in seen else None, self._bodies())
+        item = item if self._object in seen else None
+        tick = tracker.tick(dt, robot, item, self._bodies(), age)
         self._publish_command(tick.v, tick.omega)
         failed = tick.solve is not None and not tick.solve.solved
         self._mode = (
@@ -251,7 +250,7 @@ class ControllerNode(Node):
 
     def _hold(self, dt: float, missing: str) -> None:
         """Stand still while a pose that the task needs is missing; give up after a while."""
-        self.tracker.halt()
+        self.tracker.rest(dt)
         self._mode = ControllerStatus.HOLD
         self._reason = f"no valid pose of {missing}"
         self._held += dt

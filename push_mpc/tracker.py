@@ -3,22 +3,24 @@
 In a push the object is what counts. The reference for the robot is the trajectory moved by the
 difference between the nominal and the measured place of the object in the robot frame, so that the
 error is zero when the object, not the robot, is on its way.
+
+Poses are late. The object's place in the robot frame is taken from poses of one time, that of the
+frame; robot and object are then carried forward to now together, along the commands since.
 """
 
 import math
 import time
-from collections import deque
 from dataclasses import replace
 
 import numpy as np
 
 from push_model import se2
 from push_model.arrays import Array
-from push_model.kinematics import unicycle_step
 from push_model.stable_push import CurvatureLimits, shifted_limits
 from push_mpc.checks import EndCheck, FailureCheck
 from push_mpc.command import Command
 from push_mpc.controller import MpcResult, PredictiveController, Reference
+from push_mpc.dead_reckoning import DeadReckoning
 from push_mpc.grasp_estimate import GraspEstimate, distance
 from push_mpc.reference_clock import ReferenceClock
 from push_mpc.settings import TrackerSettings
@@ -36,6 +38,7 @@ class TrajectoryTracker:
         self.settings = settings
         self.controller = controller
         self._command = Command(settings, controller.drive)
+        self._reckoning = DeadReckoning(settings.pose_delay)
         self._task: Task | None = None
 
     @property
@@ -79,7 +82,6 @@ class TrajectoryTracker:
         self._end = EndCheck(self.settings, task)
         self._failure = FailureCheck(self.settings, self.controller.drive.half_track)
         self._lag = 0.0  # [m] behind the reference, at the tick before
-        self._recent: deque[tuple[float, float, float]] = deque()
         self._command.start()
         self.controller.reset()
 
@@ -88,19 +90,32 @@ class TrajectoryTracker:
         self._task = None
         self._command.stop()
 
+    def rest(self, dt: float) -> None:
+        """A frame, dt [s] after the one before, that is answered with zero; the task is kept."""
+        self._reckoning.record(dt, self.v, self.omega)
+        self._reckoning.forget(0.0)
+        self._command.stop()
+
     def halt(self) -> None:
-        """Command zero and keep the task."""
+        """Command zero after an interruption in which the robot came to rest; keep the task."""
+        self._reckoning.clear()
         self._command.stop()
 
     def tick(
-        self, dt: float, robot: Array, item: Array | None, others: Array = _NO_CIRCLES
+        self,
+        dt: float,
+        robot: Array,
+        item: Array | None,
+        others: Array = _NO_CIRCLES,
+        age: float = 0.0,
     ) -> Tick:
         """One control tick.
 
         Parameters
         ----------
         dt: [s] since the previous tick.
-        robot, item: measured poses ``(3,)``; item only matters in a push.
+        robot: last measured pose ``(3,)``, ``age`` [s] before this frame: 0 when it is seen in it.
+        item: pose ``(3,)`` of the pushed object in this frame, None when it is not seen in it.
         others: ``(n, 3)`` moving obstacles where they are now, beside the task's circles.
         """
         task = self._task
@@ -108,10 +123,15 @@ class TrajectoryTracker:
             raise RuntimeError("tick without a task")
         if len(others):
             task = replace(task, circles=np.vstack([task.circles, others]))
-        robot = self._without_delay(robot, dt)
+        self._reckoning.record(dt, self.v, self.omega)
+        at_frame = self._reckoning.at_frame(robot, age)
+        robot = self._reckoning.now(at_frame)
+        self._reckoning.forget(age)
+        seen = None if item is None else se2.between(at_frame, item)
         grasp, limits = self._grasp, None
-        if grasp is not None and item is not None:
-            grasp.update(dt, se2.between(robot, item))
+        if grasp is not None:
+            grasp.update(dt, seen)
+            item = se2.compose(robot, grasp.pose if seen is None else seen)
         if task.push is not None and grasp is not None:
             trusted = task.push.limits.scaled(self.settings.friction_trust)
             limits = shifted_limits(trusted, grasp.offset)
@@ -119,7 +139,7 @@ class TrajectoryTracker:
         reference = self._clock.reference(
             self.controller.horizon,
             self.controller.step,
-            np.zeros(3) if grasp is None or item is None else grasp.shift,
+            np.zeros(3) if grasp is None else grasp.shift,
         )
         error = self._error(robot, reference)
         self._lag = -float(error[0])
@@ -179,16 +199,6 @@ class TrajectoryTracker:
         if solve.solved and 0.0 < self.settings.deadline < late:
             return replace(solve, solved=False, late=True, reason=f"late: {1e3 * late:.1f} ms")
         return solve
-
-    def _without_delay(self, robot: Array, dt: float) -> Array:
-        """The robot's pose now, from the delayed one and the commands since."""
-        self._recent.append((dt, self.v, self.omega))
-        total = sum(step for step, _, _ in self._recent)
-        while self._recent and total - self._recent[0][0] >= self.settings.pose_delay - 1e-9:
-            total -= self._recent.popleft()[0]
-        for step, v, omega in self._recent:
-            robot = unicycle_step(robot, v, omega, step)
-        return robot
 
     def _error(self, robot: Array, reference: Reference) -> Array:
         """(2.37)."""
