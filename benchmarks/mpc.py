@@ -19,7 +19,9 @@ from push_qp import ActiveSetBackend, DaqpBackend, OsqpBackend, Qp, QpBackend, Q
 
 DRIVE = DifferentialDrive(0.0205, 0.0265, 6.28)
 LIMITS = CurvatureLimits(-1.8, 1.8)
-UNBOUNDED = replace(MpcSettings(), max_slack=100.0)
+UNBOUNDED = replace(
+    MpcSettings(), max_wheel_slack=100.0, max_curvature_slack=100.0, max_obstacle_slack=100.0
+)
 LOOPS, TICKS = 12, 50  # closed loops, and ticks of each; 1 in 50 is a cold start
 
 

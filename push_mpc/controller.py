@@ -21,8 +21,9 @@ class Reference:
 
 @dataclass(frozen=True)
 class MpcResult:
-    """acceleration: (a, epsilon) to apply now; slack: greatest violation; solve_time [s] CPU.
+    """acceleration: (a, epsilon) to apply now; solve_time [s] CPU.
 
+    slack: greatest violation of a softened row, as a part of what is allowed: 1 is at the bound.
     solved is False when the acceleration must not be used; reason says why. late: only because it
     came after its deadline.
     """

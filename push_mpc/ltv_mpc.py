@@ -9,7 +9,7 @@ from push_model.arrays import Array
 from push_model.kinematics import DifferentialDrive
 from push_model.stable_push import CurvatureLimits
 from push_mpc.controller import MpcResult, Reference
-from push_mpc.prediction import OUTPUTS, SLACKS, condense, constant_rows, tick_rows
+from push_mpc.prediction import OUTPUTS, SLACKS, SOFTENED, condense, constant_rows, tick_rows
 from push_mpc.settings import MpcSettings
 from push_qp import Qp, QpBackend, backend
 
@@ -26,6 +26,9 @@ class LtvMpc:
         self._Q = np.array(settings.state_weight)
         self._P = settings.terminal_factor * self._Q
         self._R, self._Rd = np.array(settings.input_weight), np.array(settings.input_rate_weight)
+        self._max_slack = np.array(
+            [settings.max_wheel_slack, settings.max_curvature_slack, settings.max_obstacle_slack]
+        )
         self._rollout = np.zeros((settings.horizon + 1, 5))
         self._qp = self._programme()
         self.reset()
@@ -101,14 +104,22 @@ class LtvMpc:
             return self._failed(result.status, started)
         p = self.settings.horizon
         u = result.z[: 2 * p].reshape(p, 2)
-        slack = float(result.z[2 * p :].max())
-        if slack > self.settings.max_slack:
-            return self._failed(f"constraints violated by {slack:.3g}", started)
+        part = result.z[2 * p :] / self._max_slack
+        worst = int(part.argmax())
+        if part[worst] > 1.0:
+            kind, unit = SOFTENED[worst]
+            return self._failed(
+                f"{kind} violated by {result.z[2 * p + worst]:.3g} {unit}, at most "
+                f"{self._max_slack[worst]:g} {unit} is tolerated",
+                started,
+            )
         # The tick is far shorter than a step: linearise about the same inputs next time.
         self._nominal = u.copy()
         self._previous = u[0].copy()
         cpu = time.thread_time() - started
-        return MpcResult((float(u[0, 0]), float(u[0, 1])), True, slack, cpu, "")
+        return MpcResult(
+            (float(u[0, 0]), float(u[0, 1])), True, max(float(part[worst]), 0.0), cpu, ""
+        )
 
     def programme(
         self, error: Array, reference: Reference, limits: CurvatureLimits | None, circles: Array
