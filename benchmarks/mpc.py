@@ -131,10 +131,10 @@ BACKENDS: dict[str, Callable[[], Any]] = {
     "active set, every row": WrittenOut,
     "daqp": DaqpBackend,
     "daqp, every row": lambda: DaqpBackend(every_row=True),
-    "osqp 1e-5 polish": lambda: OsqpBackend(1e-5, every_row=False),
-    "osqp 1e-5 polish, every row": lambda: OsqpBackend(1e-5),
-    "osqp 1e-3": lambda: OsqpBackend(1e-3, polish=False, every_row=False),
-    "osqp 1e-3, every row": lambda: OsqpBackend(1e-3, polish=False),
+    "osqp 1e-5 polish": lambda: OsqpBackend(1e-5),
+    "osqp 1e-5 polish, every row": lambda: OsqpBackend(1e-5, every_row=True),
+    "osqp 1e-3": lambda: OsqpBackend(1e-3, polish=False),
+    "osqp 1e-3, every row": lambda: OsqpBackend(1e-3, polish=False, every_row=True),
     "no solver": Nothing,
 }
 

@@ -52,9 +52,9 @@ class Osqp:
 
 
 class OsqpBackend(RowGeneration):
-    """OSQP with every row, or with rows as they are needed."""
+    """OSQP with rows as they are needed, or with every row."""
 
     def __init__(
-        self, tolerance: float = 1e-5, polish: bool = True, every_row: bool = True
+        self, tolerance: float = 1e-5, polish: bool = True, every_row: bool = False
     ) -> None:
         super().__init__(Osqp(tolerance, polish), every_row)
