@@ -183,15 +183,16 @@ def _record(arguments: argparse.Namespace) -> int:
 def _view(arguments: argparse.Namespace) -> int:
     from push_ros.process import run_node
     from push_scenario.scenario import load_scenario
-    from push_view.viewer import ViewerNode, ViewerServer
+    from push_view.page_server import PageServer
+    from push_view.viewer_node import ViewerNode
 
-    scenario = load_scenario(arguments.scenario)
-    server: ViewerServer | None = None
+    scenario = load_scenario(arguments.scenario) if arguments.scenario else None
+    server: PageServer | None = None
 
     def make() -> ViewerNode:
         nonlocal server
         node = ViewerNode(scenario)
-        server = ViewerServer(node, arguments.host, arguments.port)
+        server = PageServer(node, arguments.host, arguments.port)
         print(f"http://{arguments.host}:{server.port}/", flush=True)
         return node
 
@@ -285,7 +286,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--no-wait", action="store_true")
     p.add_argument("--timeout", type=float, default=300.0, help="[s] wall time")
     p = add("view", _view, "a live view in the browser; goals by mouse")
-    p.add_argument("--scenario", **scenario)  # type: ignore[arg-type]
+    p.add_argument("--scenario", default="", help="shown until the suite tells its own")
     p.add_argument("--host", default="127.0.0.1", help="address to serve on")
     p.add_argument("--port", type=int, default=8080, help="0: any that is free")
     p = add("record", _record, "record the suite's topics until Ctrl-C")

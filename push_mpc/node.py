@@ -105,7 +105,7 @@ class ControllerNode(Node):
             self,
             FollowTrajectory,
             names.robot(self.robot, "follow_trajectory"),
-            check=self._parse,
+            check=self._check,
             start=self._begin,
             cancel=self._canceled,
             preempt=lambda request: self._preempt(),
@@ -136,6 +136,10 @@ class ControllerNode(Node):
             self._tracker_settings, self._kind.make(self._mpc_settings, self._drive)
         )
         self.tracker.warm_up()
+
+    def _check(self, request: Any) -> None:
+        """Raise InvalidMessage unless the goal is a task."""
+        self._parse(request)
 
     def _parse(self, request: Any) -> tuple[Task, float]:
         """A task from a goal; raises InvalidMessage."""
