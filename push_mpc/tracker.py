@@ -39,6 +39,7 @@ class TrajectoryTracker:
         self.controller = controller
         self._command = Command(settings, controller.drive)
         self._reckoning = DeadReckoning(settings.pose_delay)
+        self._in_force = (0.0, 0.0)  # the answer to the frame before
         self._task: Task | None = None
 
     @property
@@ -92,14 +93,16 @@ class TrajectoryTracker:
 
     def rest(self, dt: float) -> None:
         """A frame, dt [s] after the one before, that is answered with zero; the task is kept."""
-        self._reckoning.record(dt, self.v, self.omega)
+        self._reckoning.record(dt, *self._in_force)
         self._reckoning.forget(0.0)
         self._command.stop()
+        self._in_force = (0.0, 0.0)
 
     def halt(self) -> None:
         """Command zero after an interruption in which the robot came to rest; keep the task."""
         self._reckoning.clear()
         self._command.stop()
+        self._in_force = (0.0, 0.0)
 
     def tick(
         self,
@@ -123,7 +126,7 @@ class TrajectoryTracker:
             raise RuntimeError("tick without a task")
         if len(others):
             task = replace(task, circles=np.vstack([task.circles, others]))
-        self._reckoning.record(dt, self.v, self.omega)
+        self._reckoning.record(dt, *self._in_force)
         at_frame = self._reckoning.at_frame(robot, age)
         robot = self._reckoning.now(at_frame)
         self._reckoning.forget(age)
@@ -165,6 +168,7 @@ class TrajectoryTracker:
             if self._command.given_up:
                 finished, code, message = True, TrackError.SOLVER_FAILED, solve.reason
                 self.stop()
+        self._in_force = (self.v, self.omega)
         curvature_margin = math.inf
         if limits is not None and self.v > _MOVING:
             kappa = self.omega / self.v

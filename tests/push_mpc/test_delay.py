@@ -178,3 +178,35 @@ def test_an_object_that_is_not_seen_keeps_its_place():
             assert np.abs(tick.error[:3] - before.error[:3]).max() < 3e-3
         before = tick
         robot = unicycle_step(robot, tick.v, tick.omega, 0.01)
+
+
+def test_a_task_that_follows_another_knows_how_the_robot_moved_before():
+    """Stopped on its way, a few frames at rest or none, then the next task: no jump of the pose."""
+    fastest = 0.0
+    for seed in range(40):
+        random, period, delay, trajectory, robot, _ = draw(seed)
+        world = LateWorld(period, delay, robot, GRASP, attached)
+        settings = replace(TrackerSettings(), pose_delay=delay * MS)
+        tracker = TrajectoryTracker(settings, LtvMpc(MpcSettings(), DRIVE))
+        task = Task(trajectory, None, NONE, 0.006, 0.03)
+        tracker.start(task)
+        world.run(0.0, 0.0, delay)
+        moving, resting = int(random.integers(5, 800 // period)), int(random.integers(0, 6))
+        for k in range(moving + resting + 1):
+            if k < moving:
+                tick = tracker.tick(period * MS, world.frame(k)[0], None)
+                v, omega = tick.v, tick.omega
+            elif k < moving + resting:
+                tracker.rest(period * MS)
+                assert (tracker.v, tracker.omega) == (0.0, 0.0)
+                v = omega = 0.0
+            else:
+                tracker.stop()
+                tracker.start(task)
+                tick = tracker.tick(period * MS, world.frame(k)[0], None)
+                place, _ = trajectory.sample(np.array([tracker._clock.time]))
+                true = se2.between(place[0], world.now[0])
+                assert tick.error[:3] == pytest.approx(true, abs=1e-6)
+            world.run(v, omega, period)
+            fastest = max(fastest, v)
+    assert fastest > 0.03

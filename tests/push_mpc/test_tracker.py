@@ -157,14 +157,16 @@ def under_way(solver=None, settings=None):
     return tracker, robot
 
 
-def test_failed_solves_stop_the_robot_and_are_reported():
+@pytest.mark.parametrize("patience", [10, 3])
+def test_failed_solves_stop_the_robot_and_are_reported(patience):
     """FAULTS 5: a problem without a solution stops it in the same tick; ten end the task."""
-    tracker, robot = under_way()
+    settings = replace(TrackerSettings(), solver_patience=patience)
+    tracker, robot = under_way(settings=settings)
     tracker.controller._solver = Broken()
     ticks = [tick for tick, _ in drive(tracker, robot, 5)]
     assert all((t.v, t.omega) == (0.0, 0.0) for t in ticks)
     assert ticks[-1].code is TrackError.SOLVER_FAILED and ticks[-1].message == "broken"
-    assert len(ticks) == tracker.failures == 10
+    assert len(ticks) == tracker.failures == patience
 
 
 class Dreamer:
