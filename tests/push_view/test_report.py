@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 from rclpy.serialization import serialize_message
 
-from push_msgs.msg import Contacts, ControllerStatus, JobState
+from push_msgs.msg import ControllerStatus, JobState
 from push_record.bag import BagWriter
 from push_ros.conversions import contacts_to_ros, pose_stamped_to_ros, poses_to_ros, time_to_ros
 from push_view.bodies import OBJECT, ROBOT, bodies_of
@@ -236,10 +236,3 @@ def test_bodies_are_drawn_at_fewer_moments_the_more_they_are(count, bodies):
 def test_a_system_without_a_panel_has_none():
     assert panel_of("single") is not None
     assert all(panel_of(name) is None for name in ("", "juggling", "os", "../report"))
-
-
-def test_contacts_of_the_bridge_are_read(scenario, tmp_path):
-    """An empty message, as is sent every tick."""
-    bag = Bag(tmp_path / "bag", scenario)
-    bag.write("/contacts", Contacts(), 0.0)
-    assert load(bag.close()).collisions.with_walls == 0
