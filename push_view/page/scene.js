@@ -1,10 +1,11 @@
-// Draws a model on a canvas: map, plans, trails, bodies, goals. Bodies that look alike are one path,
-// so that a thousand cost little more than ten.
+// Draws a model on a canvas: map, plans, trails, bodies, goals. Where bodies are many, those that look
+// alike are drawn once, as a picture that is then put where each of them is.
 
 import {poseOf} from "./model.js";
 
 const GOAL = "#c22f3d", PLAN = "#777777";
 const TEAMS = ["#2a62c9", "#7b3fb3", "#1c8a7a", "#b3436f", "#5b6f1d", "#3d7ea6", "#8a5a2b", "#4b4f9c"];
+const MANY = 100;   // bodies from which on they are pictures
 const EMPTY = [-1.5, 1.5, -1, 1];
 
 export const teamColor = number => TEAMS[number % TEAMS.length];
@@ -27,7 +28,7 @@ export function thinned(outline, scale) {
 }
 
 export class Scene {
-  constructor(canvas) { this.canvas = canvas; this.pen = canvas.getContext("2d"); this.map = null; }
+  constructor(canvas) { this.canvas = canvas; this.pen = canvas.getContext("2d"); this.map = null; this.pictures = new Map(); }
 
   frame(model) { return fitted(model.map?.extent, this.canvas.width, this.canvas.height); }
 
@@ -77,7 +78,7 @@ export class Scene {
   }
 
   bodies(f, model, colors) {
-    const groups = new Map();
+    const groups = new Map(), many = model.bodies.names.length >= MANY;
     for (let i = 0; i < model.bodies.names.length; i++) {
       const key = `${model.bodies.type[i]} ${colors[i]} ${model.lost.has(i)}`;
       if (!groups.has(key)) groups.set(key, []);
@@ -86,12 +87,42 @@ export class Scene {
     for (const members of groups.values()) {
       const i = members[0], lost = model.lost.has(i);
       const outline = model.bodies.types[model.bodies.type[i]].outline;
-      this.many(f, outline, members.map(m => poseOf(model, m)).filter(p => p), colors[i], lost);
+      const poses = members.map(m => poseOf(model, m)).filter(p => p);
+      this.pen.globalAlpha = lost ? 0.4 : 1;
+      if (many) this.put(f, this.picture(f, outline, colors[i], [model.bodies.revision, model.bodies.type[i]]), poses);
+      else this.shapes(this.pen, f, outline, poses, colors[i]);
+      this.pen.globalAlpha = 1;
     }
   }
 
-  many(f, outline, poses, color, lost) {
-    const pen = this.pen, points = thinned(outline, f.scale);
+  // An outline with a heading of 0, in the middle of a canvas of its own.
+  picture(f, outline, color, of) {
+    const key = `${of} ${color} ${f.scale} ${this.ratio}`;
+    if (!this.pictures.has(key)) {
+      if (this.pictures.size > 64) this.pictures.clear();
+      const reach = f.scale * Math.max(...outline.map(p => Math.hypot(...p))) + 2 * this.ratio;
+      const made = document.createElement("canvas");
+      made.width = made.height = 2 * Math.ceil(reach);
+      const middle = {scale: f.scale, ox: made.width / 2, oy: made.width / 2};
+      this.shapes(made.getContext("2d"), middle, outline, [{x: 0, y: 0, theta: 0}], color);
+      this.pictures.set(key, made);
+    }
+    return this.pictures.get(key);
+  }
+
+  put(f, picture, poses) {
+    const pen = this.pen, half = picture.width / 2;
+    pen.imageSmoothingEnabled = true;
+    for (const pose of poses) {
+      const c = Math.cos(pose.theta), s = Math.sin(pose.theta), [x, y] = toPixels(f, pose.x, pose.y);
+      pen.setTransform(c, -s, s, c, x, y);
+      pen.drawImage(picture, -half, -half);
+    }
+    pen.resetTransform();
+  }
+
+  shapes(pen, f, outline, poses, color) {
+    const points = thinned(outline, f.scale), alpha = pen.globalAlpha;
     const reach = 0.6 * Math.max(...outline.map(p => Math.hypot(...p)));
     const small = reach * f.scale < 6 * this.ratio;
     pen.beginPath();
@@ -101,14 +132,13 @@ export class Scene {
       points.forEach(([u, v], i) => pen[i ? "lineTo" : "moveTo"](x + c * u - s * v, y - s * u - c * v));
       pen.closePath();
     }
-    pen.globalAlpha = lost ? 0.1 : 0.35; pen.fillStyle = color; pen.fill(); pen.globalAlpha = lost ? 0.4 : 1;
+    pen.globalAlpha = 0.35 * alpha; pen.fillStyle = color; pen.fill(); pen.globalAlpha = alpha;
     for (const pose of poses) {   // headings
       const [x, y] = toPixels(f, pose.x, pose.y);
       pen.moveTo(x, y);
       pen.lineTo(x + f.scale * reach * Math.cos(pose.theta), y - f.scale * reach * Math.sin(pose.theta));
     }
     pen.strokeStyle = color; pen.lineWidth = (small ? 1 : 2) * this.ratio; pen.setLineDash([]); pen.stroke();
-    pen.globalAlpha = 1;
   }
 
   object(f, model, name, [x, y, theta], width, filled) {

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from push_view.contents import BagContents, Job
 
 _FAR = 50.0  # [1/m] margins above are no margins but free motion
+_REST = 1.0  # [s] without status after which the controller has rested
 
 _ROWS: tuple[tuple[str, Callable[[Any], float], str], ...] = (
     ("tracking error", lambda m: 1e3 * math.hypot(m.error_x, m.error_y), "{:.1f} mm"),
@@ -64,6 +65,7 @@ class _Single:
             return
         s = status[0]
         t, free = s["time"], s["curvature_margin"] > _FAR
+        rests = np.diff(t, append=t[-1]) > _REST  # no line across
         panels = [
             (
                 "tracking error [mm]",
@@ -81,7 +83,8 @@ class _Single:
         for row, (label, lines) in enumerate(panels):
             axes = figure.add_subplot(inner[row])
             for values, name in lines:
-                axes.plot(t, values, lw=0.9, label=name)
+                axes.plot(t, np.where(rests, np.nan, values), lw=0.9, label=name)
+            axes.set_xlim(t[0], max(t[-1], t[0] + 1e-3))
             axes.set_ylabel(label, fontsize=7)
             axes.tick_params(labelsize=6)
             axes.grid(alpha=0.3)

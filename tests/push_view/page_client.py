@@ -84,7 +84,7 @@ class Page:
         result = []
         thread = threading.Thread(target=lambda: result.append(work()))
         thread.start()
-        assert self.until(lambda: not thread.is_alive(), 15.0)
+        assert self.until(lambda: not thread.is_alive(), 60.0)
         return result[0]
 
     def ask(self, method, path, body=None, headers=None):
