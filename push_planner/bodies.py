@@ -1,6 +1,5 @@
 """Other bodies on the map: what stands in the way now, for one plan."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +7,7 @@ import numpy as np
 from push_model import se2
 from push_model.arrays import Array
 from push_model.occupancy import OccupancyGrid
+from push_model.outlines import distance, inside
 
 
 def with_bodies(
@@ -28,7 +28,9 @@ def with_bodies(
     cell = grid.resolution
     room = margin + 1.5 * cell  # a marked cell reaches a diagonal beyond the circle
     for x, y, radius in circles:
-        radius = min(radius, _distance(points, np.array([x, y])) - room)
+        middle = np.array([[x, y]])
+        apart = 0.0 if inside(points, middle)[0] else float(distance(points, middle)[0])
+        radius = min(radius, apart - room)
         if radius <= 0.0:
             continue
         low = np.floor((np.array([x, y]) - radius - grid.origin) / cell).astype(int)
@@ -42,17 +44,3 @@ def with_bodies(
         dy = np.maximum(np.abs(rows - y) - cell / 2.0, 0.0)
         occupied[low[1] : high[1], low[0] : high[0]] |= np.hypot(dx, dy[:, None]) <= radius
     return replace(grid, occupied=occupied)
-
-
-def _distance(points: Array, place: Array) -> float:
-    """[m] from a place ``(2,)`` to the edges of a closed polygon; 0 inside it."""
-    edge = np.roll(points, -1, axis=0) - points
-    away = place - points
-    along = np.clip((away * edge).sum(axis=1) / (edge * edge).sum(axis=1), 0.0, 1.0)
-    turn = np.arctan2(
-        away[:, 0] * np.roll(away[:, 1], -1) - away[:, 1] * np.roll(away[:, 0], -1),
-        (away * np.roll(away, -1, axis=0)).sum(axis=1),
-    )
-    if abs(float(turn.sum())) > math.pi:  # seen all round
-        return 0.0
-    return float(np.hypot(*(away - along[:, None] * edge).T).min())

@@ -15,7 +15,7 @@ from push_model.push_segment import PushSegment
 from push_model.trajectory import Trajectory, line
 from push_supervisor.settings import SupervisorSettings
 
-_STEPS = 12  # places along a retreat that are looked at
+_STEPS = 6  # places along a retreat that are looked at
 _LEAST = 1e-3  # [m] of a retreat that has no room at all
 _GIVE = 1e-3  # [m] that a retreat may come nearer to the object, as far as poses can be told
 

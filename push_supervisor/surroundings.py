@@ -40,6 +40,7 @@ class Surroundings:
         self.robot, self.item, self.others = robot, item, dict(others)
         self.grid: OccupancyGrid | None = None
         self.walls = _NONE
+        self._outline, self._item_outline = robot.outline, item.outline
         self._item_radius = item.geometry.circumradius
         self.settings = settings
 
@@ -66,7 +67,7 @@ class Surroundings:
         where = f"({goal[0]:.2f}, {goal[1]:.2f}, {goal[2]:.2f})"
         if not self.grid.contains(goal[0], goal[1]):
             raise GoalRefused(JobError.OUTSIDE_MAP, f"{where} lies outside the map")
-        if overlaps(self.grid, self.item.outline, goal):
+        if overlaps(self.grid, self._item_outline, goal):
             text = f"at {where} the object would overlap an obstacle"
             raise GoalRefused(JobError.GOAL_OCCUPIED, text)
 
@@ -81,8 +82,8 @@ class Surroundings:
         for number, segment in enumerate(segments, 1):
             for pose in segment.trajectory.pose[::2]:
                 item = se2.compose(pose, segment.grasp)
-                if overlaps(self.grid, self.robot.outline, pose) or overlaps(
-                    self.grid, self.item.outline, item
+                if overlaps(self.grid, self._outline, pose) or overlaps(
+                    self.grid, self._item_outline, item
                 ):
                     where = f"({item[0]:.2f}, {item[1]:.2f})"
                     return f"the map has changed: push {number} meets an obstacle at {where}"
@@ -123,7 +124,7 @@ class Surroundings:
         return way, self._beside(self.walls, way)
 
     def _gap(self, robot: Array, item: Array) -> float:
-        return gap(self.robot.outline, robot, self.item.outline, item)
+        return gap(self._outline, robot, self._item_outline, item)
 
     def _beside(self, circles: Array, way: Trajectory) -> Array:
         reach = _LOOK_AHEAD * self.robot.max_speed
