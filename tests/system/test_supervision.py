@@ -1,5 +1,6 @@
-"""The supervisor among the other nodes: goals in every state, bodies, maps and worlds that change."""
+"""The supervisor among the other nodes: goals in every state; bodies, maps, worlds that change."""
 
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -43,9 +44,7 @@ class Run:
         run.start()
         ready = lambda: (
             self.action.server_is_ready()
-            and all(  # noqa: E731
-                p.get_subscription_count() > 0 for p in (self.topic, self.maps, self.worlds)
-            )
+            and all(p.get_subscription_count() > 0 for p in (self.topic, self.maps, self.worlds))
         )
         assert run.spinner.until(ready, 10.0)
         self.record()
@@ -105,6 +104,7 @@ class Run:
         assert self.run.spinner.until(done.done, 5.0) and done.result().success
 
 
+@contextmanager
 def runs(scenario):
     with LockstepRun(scenario, quiet=True) as run:
         yield Run(run)
@@ -112,7 +112,8 @@ def runs(scenario):
 
 @pytest.fixture
 def run():
-    yield from runs(load_scenario("short"))
+    with runs(load_scenario("short")) as run:
+        yield run
 
 
 def test_what_is_driven_is_the_plan_that_was_published_last(run):
@@ -142,7 +143,7 @@ def test_a_pre_emptive_push_is_part_of_the_plan_that_is_driven():
     """Section 2.5, S2: no direct plan, so a push that leads away comes first, on the topic too."""
     scenario = load_scenario("short")
     _, goal, few = needs_preemptive_push(scenario, START)
-    for run in runs(scenario.settings("planner", **few)):
+    with runs(scenario.settings("planner", **few)) as run:
         run.by_topic(goal)
         run.enters("PUSHING")
         reasons = [reason for _, _, reason, _ in run.run.observer.trace.states]
@@ -327,7 +328,7 @@ def crowded(place, **settings):
 
 
 def test_a_body_on_the_goal_is_waited_for():
-    for run in runs(crowded([0.1, 0.04, 0.4], wait=1.0)):
+    with runs(crowded([0.1, 0.04, 0.4], wait=1.0)) as run:
         run.by_topic(run.goal)
         run.until(lambda: "make way" in run.state.reason)
         begun = run.run.bridge.time
@@ -338,7 +339,7 @@ def test_a_body_on_the_goal_is_waited_for():
 
 
 def test_a_body_that_stays_on_the_goal_is_given_up_on():
-    for run in runs(crowded([0.1, 0.04, 0.4], wait=0.5, max_waits=2)):
+    with runs(crowded([0.1, 0.04, 0.4], wait=0.5, max_waits=2)) as run:
         run.by_topic(run.goal)
         state = run.ends()
         assert state.error_code == JobError.GOAL_OCCUPIED and run.run.bridge.time > 1.0
@@ -347,7 +348,7 @@ def test_a_body_that_stays_on_the_goal_is_given_up_on():
 
 def test_a_body_in_the_way_is_gone_round():
     """Neither object nor robot touches it."""
-    for run in runs(crowded([-0.15, 0.02, 0.4])):
+    with runs(crowded([-0.15, 0.02, 0.4])) as run:
         run.by_topic(run.goal)
         run.reached(run.goal)
         pose = run.run.bridge.world.poses()["crate"]
