@@ -42,11 +42,9 @@ class Run:
         self.action = ActionClient(node, MoveObject, "/move_object")
         self.results = []
         run.start()
-        ready = lambda: (
-            self.action.server_is_ready()
-            and all(p.get_subscription_count() > 0 for p in (self.topic, self.maps, self.worlds))
-        )
-        assert run.spinner.until(ready, 10.0)
+        topics = (self.topic, self.maps, self.worlds)
+        assert run.spinner.until(self.action.server_is_ready, 10.0)
+        assert run.spinner.until(lambda: all(p.get_subscription_count() for p in topics), 10.0)
         self.record()
 
     def record(self):
