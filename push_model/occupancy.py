@@ -38,6 +38,14 @@ class OccupancyGrid:
         x0, x1, y0, y1 = self.extent
         return x0 <= x < x1 and y0 <= y < y1
 
+    def equals(self, other: "OccupancyGrid") -> bool:
+        """Whether both are the same map."""
+        return (
+            self.resolution == other.resolution
+            and np.array_equal(self.origin, other.origin)
+            and np.array_equal(self.occupied, other.occupied)
+        )
+
     def boundary_points(self, spacing: float) -> Array:
         """``(n, 2)`` [m] centres of occupied cells beside free ones, about ``spacing`` apart."""
         occupied = self.occupied

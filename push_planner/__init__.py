@@ -1,5 +1,6 @@
 """Two-layer planning of pushes (sections 2.2.1-2.2.3), and of the robot's way between them."""
 
+from push_planner.bodies import with_bodies
 from push_planner.distance_field import DistanceField
 from push_planner.planner import (
     PlanError,
@@ -9,7 +10,7 @@ from push_planner.planner import (
     PushPlan,
     PushPlanner,
 )
-from push_planner.preemptive import preemptive_pushes
+from push_planner.preemptive import plan_after_preemptive_push, preemptive_pushes
 from push_planner.push_curve import PushCurve, shortest_push_curve
 from push_planner.robot_path import NoRobotPath, RobotPathError, plan_robot_path
 from push_planner.scene import PushScene, PushSide, push_sides
@@ -29,8 +30,10 @@ __all__ = [
     "PushScene",
     "PushSide",
     "RobotPathError",
+    "plan_after_preemptive_push",
     "plan_robot_path",
     "preemptive_pushes",
     "push_sides",
     "shortest_push_curve",
+    "with_bodies",
 ]

@@ -11,6 +11,7 @@ from nav_msgs.msg import OccupancyGrid, Path
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
+from push_model.arrays import Array
 from push_model.occupancy import OccupancyGrid as Grid
 from push_model.settings import SettingsError
 from push_msgs.action import PlanPush
@@ -23,7 +24,9 @@ from push_planner import (
     Progress,
     PushPlan,
     PushPlanner,
+    plan_after_preemptive_push,
     plan_robot_path,
+    with_bodies,
 )
 from push_ros.actions import GoalServer
 from push_ros.conversions import (
@@ -44,7 +47,7 @@ _SIGN_OF_LIFE = 0.5  # [s] wall time between feedback messages at most
 _MAP_PATIENCE = 5.0  # [s] wall time that a request waits for the first map
 
 
-class PlannerNode(Node):
+class PlannerNode(Node):  # type: ignore[misc]
     """Plans in slices between which its executor serves others, so that a goal can be cancelled."""
 
     def __init__(
@@ -67,6 +70,8 @@ class PlannerNode(Node):
         self._work: Iterator[Progress] | None = None
         self._best: PushPlan | None = None
         self._pending = False
+        self._queued = False  # whether a slice waits for its turn
+        self._draws = 0  # requests for pre-emptive pushes: each draws others
         self.plans = self.failures = 0
         self.last_time = 0.0
         self._diagnostics = Diagnostics(self, names, self._state)
@@ -92,9 +97,10 @@ class PlannerNode(Node):
         self._watchdog = self.create_timer(
             0.5, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
-        self._on_grid(self._scenario.grid)  # until a map comes, and to warm up
+        self._grid = self._scenario.grid  # to warm up, until a map comes
         self._warm_up()
         self._grid = None
+        self._planners.clear()
 
     @property
     def ready(self) -> bool:
@@ -108,15 +114,17 @@ class PlannerNode(Node):
         self._planners.clear()
 
     def _on_map(self, message: OccupancyGrid) -> None:
+        """A plan under way on another map is dropped and begun anew."""
         try:
-            self._on_grid(grid_from_ros(message))
+            grid = grid_from_ros(message)
         except InvalidMessage as error:
             self._diagnostics.refuse("/map", str(error))
-
-    def _on_grid(self, grid: Grid) -> None:
+            return
+        if self._grid is not None and self._grid.equals(grid):
+            return
         self._grid = grid
         self._planners.clear()
-        if self._pending:
+        if self._pending or self._work is not None:
             self._begin(self._request)
 
     def _on_watchdog(self) -> None:
@@ -167,20 +175,39 @@ class PlannerNode(Node):
                     return
             start = planar_pose(request.start.pose, "the start")
             goal = planar_pose(request.goal.pose, "the goal")
-            planner = self._planner(request.robot, request.object)
-            self._work = planner.plan(start, goal)
+            self._work = self._plan(request, start, goal)
             self._continue()
         except InvalidMessage as error:
             self._fail(PlanPush.Result.INVALID_GOAL, str(error))
         except SettingsError as error:
             self._fail(PlanPush.Result.UNKNOWN_OBJECT, str(error))
 
+    def _plan(self, request: Any, start: Array, goal: Array) -> Iterator[Progress]:
+        """The work on a request, in slices; raises InvalidMessage and SettingsError."""
+        planner = self._planner(request.robot, request.object)
+        circles = circles_from_ros(request.obstacles)
+        if len(circles):
+            if circles[:, 2].min() < 0.0:
+                raise InvalidMessage("an obstacle's radius must not be negative")
+            scene, margin = planner.scene, self.settings.safety_distance
+            grid = with_bodies(scene.field.grid, circles, scene.shape.outline, start, margin)
+            planner = PushPlanner(self.settings, grid, scene.robot, scene.item)
+        if request.mode == PlanPush.Goal.DIRECT:
+            return planner.plan(start, goal)
+        if request.mode != PlanPush.Goal.PREEMPTIVE:
+            raise InvalidMessage(f"unknown mode {request.mode}")
+        self._draws += 1
+        return plan_after_preemptive_push(planner, start, goal, self.settings.seed + self._draws)
+
     def _continue(self) -> None:
         """Queue the next slice behind whatever else the executor has to do."""
-        assert self.executor is not None
-        self.executor.create_task(self._on_slice)
+        if not self._queued:
+            assert self.executor is not None
+            self._queued = True
+            self.executor.create_task(self._on_slice)
 
     def _on_slice(self) -> None:
+        self._queued = False
         if self._work is None:
             return
         try:
@@ -216,7 +243,7 @@ class PlannerNode(Node):
         self._path_publisher.publish(path_to_ros([s.trajectory for s in plan.segments], now))
 
     def _now(self) -> float:
-        return 1e-9 * self.get_clock().now().nanoseconds
+        return 1e-9 * int(self.get_clock().now().nanoseconds)
 
     def _succeed(self) -> None:
         self._work = None

@@ -4,13 +4,16 @@ The thesis draws one random curvature; here a few are drawn, straight included, 
 length is tried, so that the list is not empty by bad luck.
 """
 
+from collections.abc import Iterator
+from dataclasses import replace
+
 import numpy as np
 
 from push_model import se2
 from push_model.arrays import Array
 from push_model.kinematics import unicycle_step
 from push_model.push_segment import PushSegment
-from push_planner.planner import PushPlanner
+from push_planner.planner import PlanError, PlanningFailed, Progress, PushPlan, PushPlanner
 from push_planner.push_curve import shortest_push_curve
 from push_planner.push_search import PushStep
 
@@ -53,3 +56,49 @@ def preemptive_pushes(
                 found.append((gap, planner.segment(step)))
     found.sort(key=lambda pair: pair[0])
     return [segment for _, segment in found]
+
+
+def plan_after_preemptive_push(
+    planner: PushPlanner, start: Array, goal: Array, seed: int
+) -> Iterator[Progress]:
+    """Plan in slices like ``PushPlanner.plan``, from the end of one pre-emptive push after another.
+
+    The first from whose end there is a plan is the first push of every plan that is reported.
+
+    Raises
+    ------
+    PlanningFailed: when none leads anywhere; from the ``next`` that finds it out.
+    """
+    planner.check(start, "start", PlanError.START_OCCUPIED)
+    planner.check(goal, "goal", PlanError.GOAL_OCCUPIED)
+    offers = preemptive_pushes(planner, start, goal, seed)[: planner.settings.max_preemptive]
+    yield Progress("pre-emptive pushes", None)
+    failure = "no push leads away from the start"
+    for number, offer in enumerate(offers, 1):
+        stage = f"after pre-emptive push {number} of {len(offers)}"
+        rest: PushPlan | None = None
+        whole: PushPlan | None = None
+        try:
+            for progress in planner.plan(offer.object_end, goal):
+                if progress.best is not None and progress.best is not rest:
+                    rest = progress.best
+                    whole = _preceded(planner, offer, rest)
+                yield Progress(f"{stage}: {progress.stage}", whole)
+            return
+        except PlanningFailed as error:
+            failure = f"from the last of their ends: {error}"
+    raise PlanningFailed(
+        PlanError.NO_PUSH_SEQUENCE,
+        f"none of {len(offers)} pre-emptive pushes opens a way to the goal; {failure}",
+    )
+
+
+def _preceded(planner: PushPlanner, first: PushSegment, plan: PushPlan) -> PushPlan:
+    """A plan with a push before it, at the cost that the search would give it."""
+    following = plan.segments[0]
+    cost = plan.cost + first.length + planner.settings.push_cost
+    if following.side != first.side:
+        way = float(np.hypot(*(following.robot_start - first.robot_end)[:2]))
+        cost += way + planner.settings.side_change_cost
+    clearance = min(first.clearance, plan.clearance)
+    return replace(plan, segments=(first, *plan.segments), cost=cost, clearance=clearance)

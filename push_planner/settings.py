@@ -44,6 +44,9 @@ class PlannerSettings:
     improvement_rounds: int = bounded(
         2, low=0, high=50, doc="further guide paths searched after the first plan"
     )
+    max_preemptive: int = bounded(
+        8, low=0, high=100, doc="pre-emptive pushes from whose ends a plan is looked for"
+    )
     seed: int = bounded(1, low=1, high=2**31, doc="of the RRT*")
 
     def __post_init__(self) -> None:

@@ -11,7 +11,7 @@ from enum import IntEnum
 from typing import Any
 
 from push_model.jobs import JobError
-from push_model.settings import bounded, settings
+from push_supervisor.settings import SupervisorSettings
 
 
 class State(IntEnum):
@@ -25,48 +25,6 @@ class State(IntEnum):
     DETACHING = 6
 
 
-@settings
-class SupervisorSettings:
-    """Tolerances, patience and speeds of a job."""
-
-    auto_execute: bool = True
-    position_tolerance: float = bounded(
-        0.012, low=1e-3, high=1.0, doc="[m] of the object at the goal"
-    )
-    orientation_tolerance: float = bounded(0.06, low=1e-3, high=3.2, doc="[rad] at the goal")
-    displacement: float = bounded(
-        0.02, low=1e-3, high=1.0, doc="[m] off its planned start at which a plan is dropped"
-    )
-    displacement_turn: float = bounded(0.12, low=1e-3, high=3.2, doc="[rad] likewise")
-    max_replans: int = bounded(4, low=0, high=100, doc="new plans within one job")
-    max_retries: int = bounded(2, low=0, high=100, doc="further tries to position in a row")
-    max_losses: int = bounded(
-        40, low=0, high=10000, doc="times in a row that the controller may be gone"
-    )
-    max_preemptive: int = bounded(
-        8, low=0, high=100, doc="pre-emptive pushes offered to the planner"
-    )
-    approach_speed: float = bounded(0.04, low=1e-3, high=2.0, doc="[m/s] to contact and back")
-    acceleration: float = bounded(0.1, low=1e-3, high=10.0, doc="[m/s^2] of those motions")
-    detach_distance: float = bounded(0.06, low=5e-3, high=2.0, doc="[m] backed off after a push")
-    obstacle_margin: float = bounded(0.008, low=0.0, high=1.0, doc="[m] robot body to obstacles")
-    heartbeat_timeout: float = bounded(
-        0.25, low=0.05, high=10.0, doc="[s] without the supervisor until a robot stops"
-    )
-    controller_timeout: float = bounded(
-        1.0, low=0.2, high=60.0, doc="[s] without a sign of the controller until it counts as lost"
-    )
-    node_timeout: float = bounded(
-        20.0, low=0.5, high=600.0, doc="[s] wall time to wait for a lost node to return"
-    )
-    answer_timeout: float = bounded(
-        10.0, low=0.5, high=600.0, doc="[s] wall time without a sign of the planner: ask again"
-    )
-    pose_timeout: float = bounded(
-        5.0, low=0.2, high=60.0, doc="[s] wall time without poses until they count as lost"
-    )
-
-
 class Event(IntEnum):
     """What can happen to the machine. The payload is in the keyword arguments of ``handle``."""
 
@@ -74,13 +32,13 @@ class Event(IntEnum):
     EXECUTE = 2
     CANCEL = 3
     PLANNED = 4  # segments
-    PLAN_FAILED = 5  # code, message, retry: whether another start could help
-    OFFERS = 6  # segments: pre-emptive pushes
-    PATH = 7  # trajectory
-    PATH_FAILED = 8  # message
-    MOTION_DONE = 9
-    MOTION_FAILED = 10  # message, lost: whether the controller itself is gone
-    DISPLACED = 11  # message
+    PLAN_FAILED = 5  # code, message, retry: whether a pre-emptive push could help, crowded
+    PATH = 6  # trajectory
+    PATH_FAILED = 7  # message, crowded: whether other bodies may stand in the way
+    MOTION_DONE = 8
+    MOTION_FAILED = 9  # message, lost: whether the controller itself is gone
+    DISPLACED = 10  # message
+    NEW_MAP = 11  # problem: why what is left of the plan cannot be done on it, or empty
     CLOCK_RESET = 12
     ABORT = 13  # code, message: end the job for a reason of the owner's
 
@@ -88,16 +46,15 @@ class Event(IntEnum):
 class Command(IntEnum):
     """What the machine asks of its owner. The payload comes with it."""
 
-    PLAN = 1  # start: None for the object's pose now; goal
-    OFFER = 2  # pre-emptive pushes, goal
-    CANCEL_PLAN = 3
-    PATH = 4  # segment
-    FOLLOW_PATH = 5  # trajectory
-    FOLLOW_APPROACH = 6  # segment
-    FOLLOW_PUSH = 7  # segment
-    FOLLOW_RETREAT = 8
-    STOP = 9
-    FINISH = 10  # code, message
+    PLAN = 1  # goal, preemptive: a push that leads away first, later: wait a while before
+    CANCEL_PLAN = 2
+    PATH = 3  # segment, later
+    FOLLOW_PATH = 4  # trajectory
+    FOLLOW_APPROACH = 5  # segment
+    FOLLOW_PUSH = 6  # segment
+    FOLLOW_RETREAT = 7
+    STOP = 8
+    FINISH = 9  # code, message
 
 
 Handler = Callable[..., None]
@@ -108,11 +65,13 @@ class Machine:
     """One job at a time.
 
     at_goal: tells whether the object is within tolerance of a goal now, and describes the error.
+    touching: tells whether the robot may be touching the object now, whoever left it there.
     pushes, replans: of this job so far.
     """
 
     settings: SupervisorSettings
     at_goal: Callable[[Any], tuple[bool, str]]
+    touching: Callable[[], bool]
     state: State = State.IDLE
     reason: str = "waiting for a goal"
     goal: Any = None
@@ -125,13 +84,12 @@ class Machine:
 
     def __post_init__(self) -> None:
         self._out: list[tuple[Command, dict[str, Any]]] = []
-        self._offers: list[Any] = []
-        self._offers_asked = False
-        self._prefix: list[Any] = []
-        self._last_failure = "no plan was found"
+        self._preemptive = False  # what the planner was asked for
         self._retries = 0
         self._losses = 0
-        self._recovering = ""
+        self._waits = 0
+        self._recovering = ""  # why a new plan follows the retreat under way
+        self._backing_off = ""  # why a plan, no new one, follows it
         self._execute = False
         self._table: dict[Event, tuple[frozenset[State], Handler]] = {
             Event.GOAL: (frozenset(State), self._on_goal),
@@ -139,12 +97,12 @@ class Machine:
             Event.CANCEL: (frozenset(State), self._on_cancel),
             Event.PLANNED: (frozenset({State.PLANNING}), self._on_planned),
             Event.PLAN_FAILED: (frozenset({State.PLANNING}), self._on_plan_failed),
-            Event.OFFERS: (frozenset({State.PLANNING}), self._on_offers),
             Event.PATH: (frozenset({State.POSITIONING}), self._on_path),
             Event.PATH_FAILED: (frozenset({State.POSITIONING}), self._on_path_failed),
             Event.MOTION_DONE: (_MOVING, self._on_motion_done),
             Event.MOTION_FAILED: (_MOVING, self._on_motion_failed),
             Event.DISPLACED: (frozenset({State.POSITIONING, State.APPROACH}), self._on_displaced),
+            Event.NEW_MAP: (frozenset(State), self._on_new_map),
             Event.CLOCK_RESET: (frozenset(State), self._on_clock_reset),
             Event.ABORT: (frozenset(State), self._on_abort),
         }
@@ -158,6 +116,12 @@ class Machine:
     def segment(self) -> Any:
         """The push under way or next."""
         return self.segments[self.index]
+
+    @property
+    def remaining(self) -> list[Any]:
+        """The pushes that are not done yet."""
+        done = self.state is State.DETACHING and not self._backing_off
+        return self.segments[self.index + done :]
 
     def handle(self, event: Event, **payload: Any) -> list[tuple[Command, dict[str, Any]]]:
         """React to an event; one that means nothing in this state changes nothing."""
@@ -192,73 +156,94 @@ class Machine:
             self._finish(JobError.PREEMPTED, "a new goal replaces this one")
         self.goal, self.busy, self.error = goal, True, JobError.NONE
         self._execute = self.settings.auto_execute and not plan_only
-        self.replans = self.pushes = self._retries = self._losses = 0
+        self.replans = self.pushes = self._retries = self._losses = self._waits = 0
         self._plan("planning for a new goal")
 
-    def _plan(self, reason: str) -> None:
+    def _plan(self, reason: str, backed_off: bool = False) -> None:
+        """Ask for a plan from where the object is.
+
+        A robot at the object would be in the way of its own plan: it backs off before, unless it
+        has just done so, or could not, or is not to move yet.
+        """
         self.segments, self.index = [], 0
-        self._prefix, self._offers, self._offers_asked = [], [], False
-        self._recovering = ""
+        self._recovering = self._backing_off = ""
         there, error = self.at_goal(self.goal)
         if there:
             self._finish(JobError.NONE, f"the object is at the goal: {error}")
-            return
+        elif self._execute and not backed_off and self.touching():
+            self._back_off(reason)
+        else:
+            self._ask_plan(reason)
+
+    def _back_off(self, reason: str) -> None:
+        """Away from the object before anything else, for a reason to plan or to position."""
+        self._backing_off = reason
+        self._enter(State.DETACHING, f"backing off first; {reason}")
+        self._say(Command.FOLLOW_RETREAT)
+
+    def _backed_off(self, failure: str = "") -> None:
+        """Go on with what the robot backed off for, also when it could not."""
+        reason = "; ".join(filter(None, [self._backing_off, failure]))
+        self._backing_off = ""
+        if self.segments:
+            self._position(reason)
+        else:
+            self._plan(reason, backed_off=True)
+
+    def _ask_plan(self, reason: str, preemptive: bool = False, later: bool = False) -> None:
+        self._preemptive = preemptive
         self._enter(State.PLANNING, reason)
-        self._say(Command.PLAN, start=None, goal=self.goal)
+        self._say(Command.PLAN, goal=self.goal, preemptive=preemptive, later=later)
 
     def _on_planned(self, segments: list[Any]) -> None:
-        self.segments = [*self._prefix, *segments]
-        self.index = 0
+        self.segments, self.index = list(segments), 0
         if not self._execute:
             self._enter(State.IDLE, "a plan is ready; waiting for the execute command")
             return
         self._position("a plan was found")
 
-    def _on_plan_failed(self, code: JobError, message: str, retry: bool) -> None:
-        self._last_failure = self._last_failure if self._prefix else message
-        if not retry:
-            self._finish(code, message)
-        elif not self._offers_asked:
-            self._offers_asked = True
-            self._enter(State.PLANNING, f"{message}; looking for a pre-emptive push")
-            self._say(Command.OFFER, goal=self.goal)
+    def _on_plan_failed(
+        self, code: JobError, message: str, retry: bool = False, crowded: bool = False
+    ) -> None:
+        if retry and not self._preemptive:
+            self._ask_plan(f"{message}; looking for a pre-emptive push", preemptive=True)
+        elif crowded and self._may_wait():
+            self._ask_plan(f"{message}; waiting for others to make way", later=True)
         else:
-            self._next_offer()
+            self._finish(code, message)
 
-    def _on_offers(self, segments: list[Any]) -> None:
-        if self._offers_asked and not self._offers:
-            self._offers = list(segments)[: self.settings.max_preemptive]
-            self._next_offer()
-
-    def _next_offer(self) -> None:
-        if not self._offers:
-            self._finish(JobError.PLANNING_FAILED, self._last_failure)
-            return
-        offer = self._offers.pop(0)
-        self._prefix = [offer]
-        self._enter(State.PLANNING, "planning from the end of a pre-emptive push")
-        self._say(Command.PLAN, start=offer, goal=self.goal)
+    def _may_wait(self) -> bool:
+        """Count another wait for other bodies; False when there have been enough."""
+        self._waits += 1
+        return self._waits <= self.settings.max_waits
 
     def _on_execute(self) -> None:
         if self.plan_ready:
             self._execute = True
-            self._position("execution was commanded")
+            why = "execution was commanded"
+            if self.touching():
+                self._back_off(why)
+            else:
+                self._position(why)
 
-    def _position(self, reason: str) -> None:
+    def _position(self, reason: str, later: bool = False) -> None:
         self._enter(State.POSITIONING, reason)
-        self._say(Command.PATH, segment=self.segment)
+        self._say(Command.PATH, segment=self.segment, later=later)
 
     def _on_path(self, trajectory: Any) -> None:
         self._enter(State.POSITIONING, f"going to side {self.segment.side}")
         self._say(Command.FOLLOW_PATH, trajectory=trajectory)
 
-    def _on_path_failed(self, message: str) -> None:
-        self._retry(f"no way to side {self.segment.side}: {message}", move_away=True)
+    def _on_path_failed(self, message: str, crowded: bool = False) -> None:
+        why = f"no way to side {self.segment.side}: {message}"
+        self._retry(why, move_away=True, crowded=crowded)
 
-    def _retry(self, message: str, move_away: bool) -> None:
+    def _retry(self, message: str, move_away: bool, crowded: bool = False) -> None:
         """Another try at positioning; the robot first backs off when that may help."""
         self._retries += 1
-        if self._retries > self.settings.max_retries:
+        if self._retries > self.settings.max_retries and crowded and self._may_wait():
+            self._position(f"{message}; waiting for others to make way", later=True)
+        elif self._retries > self.settings.max_retries:
             self._say(Command.STOP)
             self._finish(JobError.POSITIONING_FAILED, message)
         elif move_away:
@@ -281,6 +266,7 @@ class Machine:
             self._push()
         elif self.state is State.PUSHING:
             self.pushes += 1
+            self._waits = 0
             following = self.index + 1
             if (
                 following < len(self.segments)
@@ -303,7 +289,10 @@ class Machine:
 
     def _detached(self) -> None:
         if self._recovering:
-            self._replan(self._recovering)
+            self._replan(self._recovering, backed_off=True)
+            return
+        if self._backing_off:
+            self._backed_off()
             return
         self.index += 1
         if self.index < len(self.segments):
@@ -313,15 +302,18 @@ class Machine:
         if there:
             self._finish(JobError.NONE, f"the goal is reached: {error}")
         else:
-            self._replan(f"the object is off its goal: {error}", JobError.OFF_TARGET)
+            why = f"the object is off its goal: {error}"
+            self._replan(why, JobError.OFF_TARGET, backed_off=True)
 
-    def _replan(self, why: str, code: JobError = JobError.EXECUTION_FAILED) -> None:
+    def _replan(
+        self, why: str, code: JobError = JobError.EXECUTION_FAILED, backed_off: bool = False
+    ) -> None:
         self.replans += 1
         if self.replans > self.settings.max_replans:
             self._say(Command.STOP)
             self._finish(code, f"{why}; gave up after {self.replans - 1} new plans")
         else:
-            self._plan(f"planning anew: {why}")
+            self._plan(f"planning anew: {why}", backed_off)
 
     def _on_motion_failed(self, message: str, lost: bool = False) -> None:
         if lost:
@@ -330,9 +322,11 @@ class Machine:
             self._retreat(message)
         elif self.state is State.POSITIONING:
             self._retry(message, move_away=False)
+        elif self._backing_off:
+            self._backed_off(f"could not back off: {message}")
         else:
             # Not even the way back is free: plan from here as it stands.
-            self._replan(f"could not back off: {message}")
+            self._replan(f"could not back off: {message}", backed_off=True)
 
     def _lost(self, message: str) -> None:
         """The controller is gone; whoever takes its place starts with the step that was cut off."""
@@ -342,12 +336,29 @@ class Machine:
             self._finish(JobError.NODE_LOST, message)
         elif self.state is State.POSITIONING:
             self._position(message)
+        elif self._backing_off:
+            self._say(Command.FOLLOW_RETREAT)
         else:
             self._retreat(self._recovering or message)
 
     def _on_displaced(self, message: str) -> None:
         self._say(Command.STOP)
         self._replan(message)
+
+    def _on_new_map(self, problem: str) -> None:
+        """A plan that is still being made is the planner's to begin anew."""
+        if not problem:
+            if self.state is State.POSITIONING:  # the way there may lead through a wall now
+                self._say(Command.STOP)
+                self._position("the map has changed")
+        elif self.plan_ready:
+            self._plan(f"planning anew: {problem}")
+        elif self.state is State.DETACHING:
+            self._recovering, self._backing_off = self._recovering or problem, ""
+        elif self.state is State.PUSHING:
+            self._retreat(problem)
+        elif self.state in (State.POSITIONING, State.APPROACH):
+            self._on_displaced(problem)
 
     def _on_cancel(self) -> None:
         self._on_abort(JobError.CANCELED, "canceled")

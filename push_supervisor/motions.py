@@ -4,6 +4,8 @@ All poses ``(3,)`` [m, m, rad] and circles ``(n, 3)`` x, y, least distance of th
 in the world frame.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from push_model import se2
@@ -11,10 +13,11 @@ from push_model.arrays import Array
 from push_model.occupancy import OccupancyGrid
 from push_model.push_segment import PushSegment
 from push_model.trajectory import Trajectory, line
-from push_supervisor.machine import SupervisorSettings
+from push_supervisor.settings import SupervisorSettings
 
-_OBSTACLE_SPACING = 0.04  # [m] between the round obstacles that stand for a wall
-_REACH = 0.4  # [m] beside a trajectory within which obstacles are handed to the controller
+_STEPS = 6  # places along a retreat that are looked at
+_LEAST = 1e-3  # [m] of a retreat that has no room at all
+_GIVE = 1e-3  # [m] that a retreat may come nearer to the object, as far as poses can be told
 
 
 def standoff(segment: PushSegment, item: Array) -> Array:
@@ -33,25 +36,70 @@ def approach(
     return line(begin, ahead, settings.approach_speed, settings.acceleration)
 
 
-def retreat(robot: Array, settings: SupervisorSettings) -> Trajectory:
-    """Straight back."""
-    return line(robot, -settings.detach_distance, settings.approach_speed, settings.acceleration)
+def retreat(
+    robot: Array,
+    gap: Callable[[Array], float],
+    walls: Array,
+    settings: SupervisorSettings,
+) -> Trajectory:
+    """Straight back, or ahead where the object is behind; as far as walls leave room.
+
+    Parameters
+    ----------
+    gap: [m] between the robot at a pose and the object.
+    walls: circles; those that hold the robot now are only not to be driven into any further.
+    """
+    steps = np.linspace(0.0, settings.detach_distance, _STEPS + 1)
+    nearest = gap(robot)
+
+    def reach(sign: float) -> tuple[float, float]:
+        """[m] free that way, and the gap gained there."""
+        poses = np.tile(robot, (len(steps), 1))
+        poses[:, 0] += sign * steps * np.cos(robot[2])
+        poses[:, 1] += sign * steps * np.sin(robot[2])
+        away = np.hypot(walls[:, 0] - poses[:, :1], walls[:, 1] - poses[:, 1:2]) - walls[:, 2]
+        room = away.min(axis=1, initial=np.inf)
+        gaps = np.array([gap(pose) for pose in poses])
+        free = (room >= min(0.0, room[0]) - 1e-9) & (gaps >= nearest - _GIVE)
+        last = len(steps) - 1 if free.all() else int(np.argmin(free)) - 1
+        return float(steps[last]), float(gaps[last]) - nearest
+
+    back, ahead = reach(-1.0), reach(1.0)
+    sign, way = (1.0, ahead[0]) if ahead[1] > back[1] + _GIVE else (-1.0, back[0])
+    return line(robot, sign * max(way, _LEAST), settings.approach_speed, settings.acceleration)
 
 
 def wall_circles(grid: OccupancyGrid, body_radius: float, margin: float) -> Array:
-    """Circles that stand for the walls of a map, for a robot of this radius [m]."""
-    points = grid.boundary_points(_OBSTACLE_SPACING)
-    return np.column_stack([points, np.full(len(points), body_radius + margin)])
+    """Circles that stand for the walls of a map, for a robot of this radius [m].
+
+    They lie about a radius apart, so that no robot slips through between them, on the centres of
+    occupied cells: half a cell more than the distance that is to be kept from a wall's face.
+    """
+    points = grid.boundary_points(max(grid.resolution, body_radius))
+    least = body_radius + margin + 0.5 * grid.resolution
+    return np.column_stack([points, np.full(len(points), least)])
 
 
-def near(circles: Array, trajectory: Trajectory) -> Array:
-    """Those of the circles that a motion along the trajectory can come close to."""
+def near(circles: Array, trajectory: Trajectory, reach: float) -> Array:
+    """Those of the circles that come within reach [m] of a trajectory."""
     path = trajectory.pose[::5, :2]
-    gap: Array = np.hypot(
+    apart: Array = np.hypot(
         circles[:, None, 0] - path[None, :, 0], circles[:, None, 1] - path[None, :, 1]
     ).min(axis=1)
-    close: Array = circles[gap < _REACH + circles[:, 2]]
+    close: Array = circles[apart < reach + circles[:, 2]]
     return close
+
+
+def spared(circles: Array, trajectory: Trajectory) -> Array:
+    """The circles, no wider than both ends of the trajectory allow.
+
+    A motion cannot do without its ends: where one lies nearer to a wall than is wanted elsewhere,
+    what the end has is kept.
+    """
+    kept = circles.copy()
+    for end in trajectory.pose[[0, -1], :2]:
+        kept[:, 2] = np.minimum(kept[:, 2], np.hypot(*(circles[:, :2] - end).T))
+    return kept
 
 
 def displacement(segment: PushSegment, item: Array) -> tuple[float, float]:

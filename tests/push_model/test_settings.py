@@ -13,7 +13,7 @@ from push_model.settings import SettingsError, bounded, from_mapping, settings
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
 from push_mpc.settings import MpcSettings, TrackerSettings
 from push_planner.settings import PlannerSettings
-from push_supervisor.machine import SupervisorSettings
+from push_supervisor.settings import SupervisorSettings
 from sim_bridge.settings import BridgeSettings, MotionCaptureSettings, PhysicsSettings
 
 ALL = (

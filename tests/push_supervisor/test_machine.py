@@ -13,9 +13,13 @@ def segment(side):
     return SimpleNamespace(side=side, object_end=f"end of {side}")
 
 
-def make(there=False, **changes):
-    answer = {"there": there}
-    machine = Machine(SupervisorSettings(**changes), lambda goal: (answer["there"], "error"))
+def make(there=False, touching=False, **changes):
+    answer = {"there": there, "touching": touching}
+    machine = Machine(
+        SupervisorSettings(**changes),
+        lambda goal: (answer["there"], "error"),
+        lambda: answer["touching"],
+    )
     return machine, answer
 
 
@@ -98,30 +102,143 @@ def test_already_there_needs_no_plan():
     assert out[-1][0] is Command.FINISH and out[-1][1]["code"] is JobError.NONE
 
 
-def failed(retry=True):
-    return (Event.PLAN_FAILED, {"code": JobError.PLANNING_FAILED, "message": "m", "retry": retry})
+def failed(retry=True, crowded=False):
+    payload = {"code": JobError.PLANNING_FAILED, "message": "m", "retry": retry}
+    return (Event.PLAN_FAILED, payload | {"crowded": crowded})
 
 
-def test_preemptive_push_comes_first_in_the_plan():
-    """Section 2.5: after a failure the planner is asked from the ends of offered pushes."""
+def asked(preemptive=False, later=False):
+    return (Command.PLAN, {"goal": "g", "preemptive": preemptive, "later": later})
+
+
+def test_after_a_failure_a_pre_emptive_push_is_asked_for_once():
+    """Section 2.5, S2: the plan that comes back has it as its first push."""
     machine, _ = make()
-    out = walk(machine, GOAL, failed())
-    assert commands(out) == [Command.OFFER]
-    a, b = segment(2), segment(3)
-    out = machine.handle(Event.OFFERS, segments=[a, b])
-    assert out[0] == (Command.PLAN, {"start": a, "goal": "g"})
-    out = walk(machine, failed())
-    assert out[0] == (Command.PLAN, {"start": b, "goal": "g"})
-    walk(machine, planned(1))
+    assert walk(machine, GOAL) == [asked()]
+    assert walk(machine, failed()) == [asked(preemptive=True)]
+    assert machine.state is State.PLANNING and "pre-emptive push" in machine.reason
+    walk(machine, planned(3, 1))
     assert [s.side for s in machine.segments] == [3, 1]
 
 
-def test_gives_up_when_no_offer_helps():
+def test_gives_up_when_no_pre_emptive_push_helps():
     machine, _ = make()
-    walk(machine, GOAL, failed())
-    machine.handle(Event.OFFERS, segments=[segment(0)])
-    out = walk(machine, failed())
+    out = walk(machine, GOAL, failed(), failed())
     assert out[-1][1]["code"] is JobError.PLANNING_FAILED and machine.state is State.IDLE
+
+
+def test_others_in_the_way_are_waited_for_and_given_up_on_in_the_end():
+    machine, _ = make(max_waits=2)
+    crowd = failed(crowded=True)
+    walk(machine, GOAL)
+    for _ in range(2):
+        assert walk(machine, crowd) == [asked(preemptive=True)]
+        assert walk(machine, crowd) == [asked(later=True)]
+    assert walk(machine, crowd) == [asked(preemptive=True)]
+    assert walk(machine, crowd)[-1][1]["code"] is JobError.PLANNING_FAILED
+
+
+def test_others_in_the_robots_way_are_waited_for_after_the_retries():
+    machine, _ = make(max_retries=1, max_waits=2)
+    no_path = (Event.PATH_FAILED, {"message": "m", "crowded": True})
+    walk(machine, GOAL, planned(0))
+    assert commands(walk(machine, no_path)) == [Command.FOLLOW_RETREAT]
+    walk(machine, DONE, planned(0))
+    for _ in range(2):
+        (out,) = walk(machine, no_path)
+        assert out[0] is Command.PATH and out[1]["later"]
+    assert walk(machine, no_path)[-1][1]["code"] is JobError.POSITIONING_FAILED
+
+
+@pytest.mark.parametrize("failure", [False, True])
+def test_a_robot_at_the_object_backs_off_before_it_plans(failure):
+    """After a cancel, a new goal in a push, or another supervisor's end: no planning round lost."""
+    machine, answer = make(touching=True)
+    assert commands(walk(machine, GOAL)) == [Command.FOLLOW_RETREAT]
+    assert machine.state is State.DETACHING and "backing off first" in machine.reason
+    # Not even the way back may be free: plan from here, and do not try again.
+    event = (Event.MOTION_FAILED, {"message": "stuck"}) if failure else DONE
+    assert (
+        walk(machine, event) == [asked()]
+        and machine.state is State.PLANNING
+        and machine.replans == 0
+    )
+    answer["touching"] = False
+    walk(machine, planned(0))
+    assert machine.state is State.POSITIONING
+
+
+def test_a_robot_at_the_object_does_not_move_before_it_may():
+    machine, _ = make(touching=True)
+    assert machine.handle(Event.GOAL, goal="g", plan_only=True) == [asked()]
+    walk(machine, planned(0))
+    assert machine.plan_ready
+    assert commands(machine.handle(Event.EXECUTE)) == [Command.FOLLOW_RETREAT]
+    assert commands(walk(machine, DONE)) == [Command.PATH] and machine.replans == 0
+
+
+def test_a_robot_that_was_backing_off_goes_on_with_it_when_its_controller_returns():
+    machine, _ = make(touching=True)
+    walk(machine, GOAL)
+    lost = machine.handle(Event.MOTION_FAILED, message="gone", lost=True)
+    assert commands(lost) == [Command.FOLLOW_RETREAT]
+    assert walk(machine, DONE) == [asked()] and machine.replans == 0
+
+
+def test_a_moved_object_next_to_the_robot_is_backed_off_from():
+    machine, answer = make()
+    walk(machine, GOAL, planned(0), PATH)
+    answer["touching"] = True
+    out = machine.handle(Event.DISPLACED, message="moved")
+    assert commands(out) == [Command.STOP, Command.FOLLOW_RETREAT]
+    assert walk(machine, DONE) == [asked()] and machine.replans == 1
+
+
+NEW_MAP = {"problem": "push 1 meets a wall"}
+
+
+@pytest.mark.parametrize("steps", range(8))
+def test_a_map_that_blocks_the_plan_makes_it_anew_in_every_state(steps):
+    machine, _ = make()
+    walk(machine, *[GOAL, planned(0, 1), PATH, DONE, DONE, DONE, DONE][:steps])
+    before = machine.state
+    out = commands(machine.handle(Event.NEW_MAP, **NEW_MAP))
+    if before in (State.IDLE, State.PLANNING):
+        assert out == [] and machine.state is before
+    elif before in (State.POSITIONING, State.APPROACH):
+        assert out == [Command.STOP, Command.PLAN] and machine.replans == 1
+    else:
+        assert out == ([Command.FOLLOW_RETREAT] if before is State.PUSHING else [])
+        assert walk(machine, DONE) == [asked()] and machine.replans == 1
+
+
+def test_a_map_that_blocks_nothing_only_makes_the_way_anew():
+    machine, _ = make()
+    free = (Event.NEW_MAP, {"problem": ""})
+    walk(machine, GOAL, planned(0), PATH)
+    assert commands(walk(machine, free)) == [Command.STOP, Command.PATH]
+    for event in (PATH, DONE, DONE):
+        before = walk(machine, event)
+        assert before and (machine.state is State.POSITIONING or walk(machine, free) == [])
+    assert machine.replans == 0
+
+
+def test_a_waiting_plan_that_a_map_blocks_is_made_anew_and_waits_again():
+    machine, _ = make(auto_execute=False, touching=True)
+    walk(machine, GOAL, planned(0))
+    assert walk(machine, (Event.NEW_MAP, NEW_MAP)) == [asked()]
+    walk(machine, planned(1))
+    assert machine.plan_ready and machine.replans == 0
+
+
+def test_what_remains_of_a_plan():
+    machine, _ = make()
+    walk(machine, GOAL, planned(0, 1))
+    left = []
+    for event in (PATH, DONE, DONE, DONE, DONE, PATH, DONE, DONE, DONE):
+        left.append(len(machine.remaining))
+        walk(machine, event)
+    assert left == [2, 2, 2, 2, 1, 1, 1, 1, 1] and machine.remaining == []
 
 
 def test_hopeless_goal_is_not_retried():
@@ -136,10 +253,7 @@ def test_failed_push_backs_off_and_plans_anew_from_where_the_object_is():
     out = machine.handle(Event.MOTION_FAILED, message="contact lost")
     assert machine.state is State.DETACHING and commands(out) == [Command.FOLLOW_RETREAT]
     out = walk(machine, DONE)
-    assert machine.state is State.PLANNING and out[0] == (
-        Command.PLAN,
-        {"start": None, "goal": "g"},
-    )
+    assert machine.state is State.PLANNING and out == [asked()]
     assert "contact lost" in machine.reason
 
 
@@ -213,14 +327,16 @@ ANY = st.sampled_from(
         planned(1, 1),
         failed(),
         failed(False),
-        (Event.OFFERS, {"segments": []}),
-        (Event.OFFERS, {"segments": [segment(2), segment(3)]}),
+        failed(crowded=True),
         PATH,
         (Event.PATH_FAILED, {"message": "m"}),
+        (Event.PATH_FAILED, {"message": "m", "crowded": True}),
         DONE,
         (Event.MOTION_FAILED, {"message": "m"}),
         (Event.MOTION_FAILED, {"message": "m", "lost": True}),
         (Event.DISPLACED, {"message": "m"}),
+        (Event.NEW_MAP, {"problem": "p"}),
+        (Event.NEW_MAP, {"problem": ""}),
         (Event.CLOCK_RESET, {}),
     ]
 )
@@ -232,15 +348,20 @@ MOTIONS = {
 }
 
 
-@given(st.lists(ANY, max_size=60), st.booleans(), st.booleans())
-def test_invariants_of_any_walk(events, automatic, there):
-    machine, _ = make(there, auto_execute=automatic)
+@given(st.lists(ANY, max_size=60), st.booleans(), st.booleans(), st.booleans())
+def test_invariants_of_any_walk(events, automatic, there, touching):
+    machine, _ = make(there, touching, auto_execute=automatic)
+    allowed = automatic
     for event, payload in events:
         before = machine.state
+        allowed = automatic or (
+            event is Event.EXECUTE if machine.plan_ready else allowed and machine.busy
+        )
         out = commands(machine.handle(event, **payload))
         assert sum(c in MOTIONS for c in out) <= 1
         if MOTIONS & set(out):
             assert machine.state not in (State.IDLE, State.PLANNING)
+            assert allowed  # nothing moves a robot before it may
         if machine.state is State.PUSHING:
             assert machine.index < len(machine.segments)
         if machine.state is State.IDLE and before not in (State.IDLE, State.PLANNING):

@@ -46,27 +46,85 @@ def test_approach_ends_in_contact_and_comes_along_the_normal(segment):
     assert way.twist[:, 0].max() <= SupervisorSettings().approach_speed + 1e-9
 
 
-def test_retreat_goes_straight_back(segment):
-    way = motions.retreat(segment.robot_end, SupervisorSettings())
-    back = se2.between(segment.robot_end, way.pose[-1])
-    assert back == pytest.approx([-SupervisorSettings().detach_distance, 0.0, 0.0])
-    assert (way.twist[:, 0] <= 0.0).all() and not way.twist[:, 1].any()
+DISTANCE = SupervisorSettings().detach_distance
+NO_WALLS = np.zeros((0, 3))
 
 
-def test_wall_circles_leave_no_gap_a_robot_could_slip_through():
-    grid = rasterise(EnvironmentSpec((1.0, 0.8)))
-    circles = motions.wall_circles(grid, 0.035, 0.008)
-    x = np.linspace(-0.5, 0.5, 500)
-    for y in (-0.4, 0.4):
-        gap = np.hypot(circles[:, None, 0] - x, circles[:, None, 1] - y) - circles[:, 2:]
+def retreated(robot, item, walls=NO_WALLS):
+    """Way [m] of a retreat from a round object of 5 cm; positive ahead."""
+
+    def gap(pose):
+        return max(0.0, float(np.hypot(*(pose - item)[:2])) - 0.1)
+
+    way = motions.retreat(robot, gap, walls, SupervisorSettings())
+    moved = se2.between(robot, way.pose[-1])
+    assert moved[1:] == pytest.approx([0.0, 0.0]) and not way.twist[:, 1].any()
+    assert np.abs(way.twist[:, 0]).max() <= SupervisorSettings().approach_speed + 1e-9
+    return float(moved[0])
+
+
+@pytest.mark.parametrize("bearing", np.linspace(-np.pi, np.pi, 13))
+@pytest.mark.parametrize("apart", [0.1, 0.12])
+def test_retreat_leads_away_from_the_object_wherever_it_is(bearing, apart):
+    robot = np.array([0.3, -0.2, 0.9])
+    item = robot + [*(apart * np.array([np.cos(0.9 + bearing), np.sin(0.9 + bearing)])), 0.0]
+    behind = abs(bearing) > np.pi / 2 + 0.1
+    assert retreated(robot, item) == pytest.approx(DISTANCE if behind else -DISTANCE)
+
+
+def test_retreat_ends_before_a_wall():
+    random = np.random.default_rng(5)
+    short = 0
+    for _ in range(300):
+        robot = np.array([0.0, 0.0, random.uniform(-4, 4)])
+        item = se2.compose(robot, np.array([0.1, 0.0, 0.0]))
+        walls = np.column_stack([random.uniform(-0.15, 0.15, (4, 2)), np.full(4, 0.045)])
+        room = np.hypot(*(walls[:, :2] - robot[:2]).T) - walls[:, 2]
+        way = retreated(robot, item, walls)
+        assert -DISTANCE - 1e-9 <= way <= -1e-3 + 1e-9
+        short += way > -0.5 * DISTANCE
+        if way < -2e-3:  # there was room: a wall is never entered, or entered any further
+            after = se2.compose(robot, np.array([way, 0.0, 0.0]))
+            left = np.hypot(*(walls[:, :2] - after[:2]).T) - walls[:, 2]
+            assert left.min() >= min(0.0, room.min()) - 1e-9
+    assert 30 < short < 270
+
+
+def test_circles_are_as_wide_as_the_ends_of_a_motion_allow(segment):
+    """Walls are kept on the approach; one beside its end as far as the end is from it."""
+    way = segment.trajectory
+    ends = way.pose[[0, -1], :2]
+    circles = np.array(
+        [[*(ends[1] + [0.03, 0.0]), 0.05], [*(ends[0] - [0.0, 0.02]), 0.05], [9.0, 9.0, 0.05]]
+    )
+    assert motions.spared(circles, way)[:, 2] == pytest.approx([0.03, 0.02, 0.05])
+    assert circles[:, 2] == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize("resolution", [0.01, 0.02, 0.05, 0.1])
+@pytest.mark.parametrize("radius", [0.037, 0.25])
+def test_wall_circles_leave_no_gap_a_robot_could_slip_through(resolution, radius):
+    """Whatever the map's cells and the robot: on the walls' faces there is no room at all, and at
+    the wanted distance from them nothing is lost by half a cell."""
+    grid = rasterise(EnvironmentSpec((2.0, 1.6), resolution=resolution))
+    circles = motions.wall_circles(grid, radius, 0.008)
+    x = np.linspace(-1.0, 1.0, 500)
+    for sign in (-1.0, 1.0):
+        face = sign * 0.8
+        gap = np.hypot(circles[:, None, 0] - x, circles[:, None, 1] - face) - circles[:, 2:]
         assert gap.min(axis=0).max() < 0.0
+        clear = face - sign * (radius + 0.008 + 1e-9)
+        inner = np.abs(x) < 1.0 - radius - 0.05
+        gap = np.hypot(circles[:, None, 0] - x[inner], circles[:, None, 1] - clear)
+        assert (gap - circles[:, 2:]).min() > -1e-6
 
 
 def test_near_keeps_what_the_motion_can_come_close_to(segment):
     on_the_way = se2.compose(START, np.array([0.2, 0.3, 0.0]))[:2]
     circles = np.array([[*on_the_way, 0.04], [5.0, 5.0, 0.04]])
-    assert motions.near(circles, segment.trajectory).tolist() == circles[:1].tolist()
-    assert motions.near(np.zeros((0, 3)), segment.trajectory).shape == (0, 3)
+    assert motions.near(circles, segment.trajectory, 0.4).tolist() == circles[:1].tolist()
+    assert motions.near(circles, segment.trajectory, 0.1).shape == (0, 3)
+    assert motions.near(np.zeros((0, 3)), segment.trajectory, 0.4).shape == (0, 3)
 
 
 def test_displacement_is_measured_from_the_planned_start(segment):

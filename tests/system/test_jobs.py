@@ -78,6 +78,8 @@ def bad(kind, goal):
         message.pose.position.x = math.nan
     elif kind == "frame":
         message.header.frame_id = "odom"
+    elif kind == "occupied":
+        message.pose.position.x = 1.49
     else:
         message.pose.position.x = 40.0
     return message
@@ -87,6 +89,7 @@ CODES = {
     "nan": MoveObject.Result.INVALID_GOAL,
     "frame": MoveObject.Result.UNKNOWN_FRAME,
     "outside": MoveObject.Result.OUTSIDE_MAP,
+    "occupied": MoveObject.Result.GOAL_OCCUPIED,
 }
 
 

@@ -107,7 +107,7 @@ def test_a_map_of_map_server_is_an_environment(room):
     with LockstepRun(load_scenario(room), quiet=True) as run:
         run.start()
         beyond = run.reach(np.array([0.0, 0.5, 0.0]))
-        assert beyond.error_code == MoveObject.Result.GOAL_OCCUPIED, beyond
+        assert beyond.refusal_code == MoveObject.Result.GOAL_OCCUPIED, beyond
         state = run.reach(run.scenario.goal)
         assert state.error_code == 0, state
 

@@ -1,0 +1,174 @@
+"""Errands: what was asked of which node, how often, and what to make of silence. No ROS.
+
+The state machine commands; a node is asked as soon as it is there and the poses are known. One that
+dies in the middle of its work never answers. Its servers stay in the graph for seconds, and those
+of one started in its place look the same: only signs of life tell. Those of the controller are
+measured in pose time, which stands still with the poses, and in wall time, for a simulation that
+runs fast; those of the planner in wall time, which it works in.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+from push_model.jobs import JobError
+from push_supervisor.machine import Command
+from push_supervisor.settings import SupervisorSettings
+
+ASKS = 3
+"""Times that the planner is asked the same."""
+
+
+class Peer(Enum):
+    """Who can be asked."""
+
+    PLANNER = "the planner"
+    PATHS = "the planner of the robot's way"
+    CONTROLLER = "the controller"
+
+
+PEERS = {
+    Command.PLAN: Peer.PLANNER,
+    Command.PATH: Peer.PATHS,
+    Command.FOLLOW_PATH: Peer.CONTROLLER,
+    Command.FOLLOW_APPROACH: Peer.CONTROLLER,
+    Command.FOLLOW_PUSH: Peer.CONTROLLER,
+    Command.FOLLOW_RETREAT: Peer.CONTROLLER,
+}
+"""Who is asked for what."""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """wall [s]: a clock that stands still while the world is paused; stamp [s]: of the poses;
+    poses: whether those of robot and object are known; ready: whether a peer's server is there."""
+
+    wall: float
+    stamp: float
+    poses: bool
+    ready: Callable[[Peer], bool]
+
+
+@dataclass(frozen=True)
+class Errand:
+    """What to ask: the command and what comes with it. delay: [s] of pose time to wait before."""
+
+    command: Command
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    delay: float = 0.0
+
+    @property
+    def peer(self) -> Peer:
+        """Who is asked."""
+        return PEERS[self.command]
+
+
+class Step(Enum):
+    """What the owner is to do now."""
+
+    WAIT = "nothing"
+    ASK = "ask, with the number of this asking"
+    LOST = "the controller is gone"
+    GIVE_UP = "nobody will answer"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """code, message: with GIVE_UP and LOST."""
+
+    step: Step
+    code: JobError = JobError.NONE
+    message: str = ""
+
+
+_WAIT, _ASK = Verdict(Step.WAIT), Verdict(Step.ASK)
+
+
+class Errands:
+    """One errand at a time; each asking has a number, by which answers are told from late ones.
+
+    errand: the one under way, None when there is none. asks: how often it was asked.
+    """
+
+    def __init__(self, settings: SupervisorSettings) -> None:
+        self.settings = settings
+        self.errand: Errand | None = None
+        self.number = 0
+        self.asks = 0
+        self._asked = False
+        self._not_before = 0.0  # [s] pose time
+        self._missing: float | None = None  # [s] wall time since when it could not be asked
+        self._sign_wall = self._sign_stamp = 0.0
+
+    def begin(self, errand: Errand, now: Moment) -> None:
+        """Take an errand in the place of whatever is under way."""
+        self.drop()
+        self.errand = errand
+        self._not_before = now.stamp + errand.delay
+
+    def drop(self) -> None:
+        """Whatever is under way is not wanted any more; answers to it are late."""
+        self.errand = None
+        self.number += 1
+        self.asks = 0
+        self._asked, self._missing = False, None
+
+    def tend(self, now: Moment) -> Verdict:
+        """To be called often; says what to do. After ASK the errand counts as asked."""
+        if self.errand is None:
+            return _WAIT
+        if self._asked:
+            return self._listen(self.errand, now)
+        if now.poses and now.ready(self.errand.peer):
+            self._missing = None
+            if now.stamp < self._not_before:
+                return _WAIT
+            return self._ask(now)
+        if self._missing is None:
+            self._missing = now.wall
+        if now.wall - self._missing <= self.settings.node_timeout:
+            return _WAIT
+        peer = self.errand.peer
+        self.drop()
+        if now.poses:
+            return Verdict(Step.GIVE_UP, JobError.NODE_LOST, f"{peer.value} is not there")
+        return Verdict(Step.GIVE_UP, JobError.POSES_STALE, "no poses of robot and object")
+
+    def sign(self, number: int, now: Moment) -> None:
+        """A sign of life of whoever was asked with this number."""
+        if number == self.number and self._asked:
+            self._sign_wall, self._sign_stamp = now.wall, now.stamp
+
+    def answer(self, number: int) -> bool:
+        """Whether an answer is the one waited for, and not a late one; the errand is done then."""
+        if number != self.number or not self._asked:
+            return False
+        self.drop()
+        return True
+
+    def _ask(self, now: Moment) -> Verdict:
+        self.number += 1
+        self.asks += 1
+        self._asked = True
+        self._sign_wall, self._sign_stamp = now.wall, now.stamp
+        return _ASK
+
+    def _listen(self, errand: Errand, now: Moment) -> Verdict:
+        """Whether the silence has lasted too long."""
+        silence = now.wall - self._sign_wall
+        if errand.peer is Peer.CONTROLLER:
+            silence = min(silence, now.stamp - self._sign_stamp)
+            if silence <= self.settings.controller_timeout:
+                return _WAIT
+            self.drop()
+            return Verdict(Step.LOST, JobError.NODE_LOST, f"{errand.peer.value} is gone")
+        if silence <= self.settings.answer_timeout:
+            return _WAIT
+        if self.asks >= ASKS:
+            self.drop()
+            text = f"{errand.peer.value} does not answer"
+            return Verdict(Step.GIVE_UP, JobError.NODE_LOST, text)
+        self.number += 1  # what comes now is late
+        self._asked = False
+        return self.tend(now)

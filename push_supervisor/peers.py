@@ -1,0 +1,193 @@
+"""The nodes that do the work: questions to planner and controller out, events back.
+
+Every question has a number, which comes back with its answer and with each sign of life.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.node import Node
+
+from push_model.arrays import Array
+from push_model.jobs import JobError
+from push_model.push_segment import PushSegment
+from push_model.trajectory import Trajectory
+from push_msgs.action import FollowTrajectory, PlanPush
+from push_msgs.srv import PlanRobotPath
+from push_ros.actions import GoalClient
+from push_ros.conversions import (
+    circles_to_ros,
+    pose_stamped_to_ros,
+    pose_to_ros,
+    segment_from_ros,
+    trajectory_from_ros,
+    trajectory_to_ros,
+)
+from push_ros.names import Names
+from push_ros.validation import InvalidMessage
+from push_supervisor.errands import Peer
+from push_supervisor.machine import Event
+
+Answered = Callable[[int, Event, dict[str, Any]], None]
+"""Called with the number of a question, and the event that its answer is."""
+
+_PLAN_ERRORS = {
+    PlanPush.Result.INVALID_GOAL: JobError.INVALID_GOAL,
+    PlanPush.Result.UNKNOWN_OBJECT: JobError.UNKNOWN_OBJECT,
+    PlanPush.Result.UNKNOWN_FRAME: JobError.UNKNOWN_FRAME,
+    PlanPush.Result.OUTSIDE_MAP: JobError.OUTSIDE_MAP,
+    PlanPush.Result.GOAL_OCCUPIED: JobError.GOAL_OCCUPIED,
+    PlanPush.Result.TOO_HEAVY: JobError.TOO_HEAVY,
+}
+_ONLY_A_BODY_MATTERS = (  # failures that others who stand in the way can cause
+    PlanPush.Result.START_OCCUPIED,
+    PlanPush.Result.GOAL_OCCUPIED,
+    PlanPush.Result.NO_GUIDE_PATH,
+    PlanPush.Result.NO_PUSH_SEQUENCE,
+)
+
+
+class Peers:
+    """Asks for one robot and one object.
+
+    answered, sign: called with the number of the question.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        names: Names,
+        robot: str,
+        item: str,
+        answered: Answered,
+        sign: Callable[[int], None],
+    ) -> None:
+        self._robot, self._item = robot, item
+        self._answered, self._sign = answered, sign
+        self._planner = GoalClient(node, PlanPush, names.team("plan_push"))
+        self._paths = node.create_client(PlanRobotPath, names.team("plan_robot_path"))
+        self._controller = GoalClient(
+            node, FollowTrajectory, names.robot(robot, "follow_trajectory")
+        )
+
+    def ready(self, peer: Peer) -> bool:
+        """Whether it is there."""
+        if peer is Peer.PATHS:
+            return bool(self._paths.service_is_ready())
+        return bool((self._planner if peer is Peer.PLANNER else self._controller).ready)
+
+    def let_go(self) -> None:
+        """Cancel what the others are doing for this one."""
+        self._planner.forget()
+        self._controller.forget()
+
+    def plan(
+        self,
+        number: int,
+        start: Array,
+        goal: Array,
+        stamp: float,
+        preemptive: bool,
+        bodies: Array,
+    ) -> None:
+        """Ask for a plan. bodies: circles ``(n, 3)`` about others. stamp: [s] of the poses."""
+        request = PlanPush.Goal(
+            mode=PlanPush.Goal.PREEMPTIVE if preemptive else PlanPush.Goal.DIRECT,
+            object=self._item,
+            robot=self._robot,
+            start=pose_stamped_to_ros(start, stamp),
+            goal=pose_stamped_to_ros(goal, stamp),
+            obstacles=circles_to_ros(bodies),
+        )
+
+        def failed(code: JobError, message: str, **reasons: bool) -> None:
+            payload = {"code": code, "message": message, **reasons}
+            self._answered(number, Event.PLAN_FAILED, payload)
+
+        def done(result: Any) -> None:
+            if result is None:
+                failed(JobError.PLANNING_FAILED, "the planner rejected the request")
+                return
+            error = result.error_code
+            if error != PlanPush.Result.NONE:
+                failed(
+                    _PLAN_ERRORS.get(error, JobError.PLANNING_FAILED),
+                    result.error_msg,
+                    retry=error == PlanPush.Result.NO_PUSH_SEQUENCE,
+                    crowded=len(bodies) > 0 and error in _ONLY_A_BODY_MATTERS,
+                )
+                return
+            try:
+                segments = [segment_from_ros(s) for s in result.plan.segments]
+            except InvalidMessage as problem:
+                failed(JobError.PLANNING_FAILED, f"the plan is not valid: {problem}")
+                return
+            self._answered(number, Event.PLANNED, {"segments": segments})
+
+        self._planner.send(request, done, lambda feedback: self._sign(number))
+
+    def path(self, number: int, start: Array, goal: Array, circles: Array, crowded: bool) -> None:
+        """Ask for a way of the robot alone. crowded: whether others are among the circles."""
+        request = PlanRobotPath.Request(
+            robot=self._robot,
+            start=pose_to_ros(start),
+            goal=pose_to_ros(goal),
+            obstacles=circles_to_ros(circles),
+        )
+
+        def failed(message: str) -> None:
+            payload = {"message": message, "crowded": crowded}
+            self._answered(number, Event.PATH_FAILED, payload)
+
+        def done(future: Any) -> None:
+            answer = future.result()
+            if answer is None or answer.error_code != PlanRobotPath.Response.NONE:
+                failed("no answer" if answer is None else answer.message)
+                return
+            try:
+                trajectory = trajectory_from_ros(answer.trajectory)
+            except InvalidMessage as problem:
+                failed(str(problem))
+                return
+            self._answered(number, Event.PATH, {"trajectory": trajectory})
+
+        self._paths.call_async(request).add_done_callback(done)
+
+    def move(self, number: int, way: Trajectory, circles: Array, heartbeat: float) -> None:
+        """Have the robot drive. heartbeat: [s] without one after which it is to stop."""
+        goal = FollowTrajectory.Goal(
+            mode=FollowTrajectory.Goal.MOVE,
+            object=self._item,
+            trajectory=trajectory_to_ros(way),
+            obstacles=circles_to_ros(circles),
+            heartbeat_timeout=heartbeat,
+        )
+        self._follow(number, goal)
+
+    def push(self, number: int, segment: PushSegment, circles: Array, heartbeat: float) -> None:
+        """Have the robot push."""
+        goal = FollowTrajectory.Goal(
+            mode=FollowTrajectory.Goal.PUSH,
+            object=self._item,
+            trajectory=trajectory_to_ros(segment.trajectory),
+            contact=pose_to_ros(segment.grasp),
+            curvature_min=segment.limits.minimum,
+            curvature_max=segment.limits.maximum,
+            obstacles=circles_to_ros(circles),
+            heartbeat_timeout=heartbeat,
+        )
+        self._follow(number, goal)
+
+    def _follow(self, number: int, goal: Any) -> None:
+        def done(result: Any) -> None:
+            if result is None:
+                text = "the controller rejected the trajectory"
+                self._answered(number, Event.MOTION_FAILED, {"message": text})
+            elif result.error_code == FollowTrajectory.Result.NONE:
+                self._answered(number, Event.MOTION_DONE, {})
+            elif result.error_code == FollowTrajectory.Result.CLOCK_RESET:
+                self._answered(number, Event.CLOCK_RESET, {})
+            else:
+                self._answered(number, Event.MOTION_FAILED, {"message": result.error_msg})
+
+        self._controller.send(goal, done, lambda feedback: self._sign(number))

@@ -1,0 +1,131 @@
+"""What stands around a job: the map, the other bodies, and which motions and goals they allow.
+
+Poses ``(3,)`` [m, m, rad], circles ``(n, 3)`` x, y and least distance of the axle midpoint [m],
+world frame. Pure geometry: the poses are passed in.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from push_model import se2
+from push_model.arrays import Array
+from push_model.jobs import GoalRefused, JobError
+from push_model.occupancy import OccupancyGrid
+from push_model.push_segment import PushSegment
+from push_model.specs import ObjectSpec, RobotSpec
+from push_model.trajectory import Trajectory
+from push_supervisor import motions
+from push_supervisor.footprint import gap, overlaps
+from push_supervisor.settings import SupervisorSettings
+
+_LOOK_AHEAD = 3.0  # [s] of full speed beside a motion within which obstacles matter
+_TOUCHING = 0.8  # of the distance that a robot backs off: nearer, it has not backed off
+_NONE = np.zeros((0, 3))
+
+
+class Surroundings:
+    """Of one robot and one object.
+
+    others: [m] radius of each other body, by name.
+    """
+
+    def __init__(
+        self,
+        robot: RobotSpec,
+        item: ObjectSpec,
+        others: Mapping[str, float],
+        settings: SupervisorSettings,
+    ) -> None:
+        self.robot, self.item, self.others = robot, item, dict(others)
+        self.grid: OccupancyGrid | None = None
+        self.walls = _NONE
+        self._outline, self._item_outline = robot.outline, item.outline
+        self._item_radius = item.geometry.circumradius
+        self.settings = settings
+
+    def change_settings(self, settings: SupervisorSettings) -> None:
+        """The margin may be another one."""
+        self.settings = settings
+        if self.grid is not None:
+            self._draw_walls(self.grid)
+
+    def take_map(self, grid: OccupancyGrid) -> bool:
+        """A map has come; whether it differs from the one before."""
+        old, self.grid = self.grid, grid
+        self._draw_walls(grid)
+        return old is not None and not old.equals(grid)
+
+    def _draw_walls(self, grid: OccupancyGrid) -> None:
+        margin = self.settings.obstacle_margin
+        self.walls = motions.wall_circles(grid, self.robot.body_radius, margin)
+
+    def check_goal(self, goal: Array) -> None:
+        """Raise GoalRefused where the object cannot stand; without a map all is allowed."""
+        if self.grid is None:
+            return
+        where = f"({goal[0]:.2f}, {goal[1]:.2f}, {goal[2]:.2f})"
+        if not self.grid.contains(goal[0], goal[1]):
+            raise GoalRefused(JobError.OUTSIDE_MAP, f"{where} lies outside the map")
+        if overlaps(self.grid, self._item_outline, goal):
+            text = f"at {where} the object would overlap an obstacle"
+            raise GoalRefused(JobError.GOAL_OCCUPIED, text)
+
+    def touching(self, robot: Array, item: Array) -> bool:
+        """Whether the robot stands nearer to the object than it does after it has backed off."""
+        return self._gap(robot, item) < _TOUCHING * self.settings.detach_distance
+
+    def blocked(self, segments: Sequence[PushSegment]) -> str:
+        """Which of the pushes the map does not allow, in words; empty when all are free."""
+        if self.grid is None:
+            return ""
+        for number, segment in enumerate(segments, 1):
+            for pose in segment.trajectory.pose[::2]:
+                item = se2.compose(pose, segment.grasp)
+                if overlaps(self.grid, self._outline, pose) or overlaps(
+                    self.grid, self._item_outline, item
+                ):
+                    where = f"({item[0]:.2f}, {item[1]:.2f})"
+                    return f"the map has changed: push {number} meets an obstacle at {where}"
+        return ""
+
+    def bodies(self, poses: Mapping[str, Array | None], extra: float = 0.0) -> Array:
+        """Circles ``(n, 3)`` about the other bodies, as wide as they are and ``extra`` [m]."""
+        rows = [
+            (pose[0], pose[1], radius + extra)
+            for name, radius in self.others.items()
+            if (pose := poses.get(name)) is not None
+        ]
+        return np.array(rows, dtype=np.float64).reshape(-1, 3)
+
+    def on_the_way(self, item: Array, poses: Mapping[str, Array | None]) -> Array:
+        """Circles that the way to a stand-off goes round: the object and the other bodies."""
+        radius = self.robot.footprint_radius
+        own = [[item[0], item[1], self._item_radius + radius]]
+        return np.vstack([own, self.bodies(poses, radius)])
+
+    def follow(self, way: Trajectory, item: Array) -> Array:
+        """What to keep off on the way to a stand-off: walls and the object."""
+        reach = self._item_radius + self.robot.body_radius + self.settings.obstacle_margin
+        return self._beside(np.vstack([self.walls, [[item[0], item[1], reach]]]), way)
+
+    def approach(self, segment: PushSegment, robot: Array, item: Array) -> tuple[Trajectory, Array]:
+        """To contact, keeping off walls."""
+        way = motions.approach(segment, robot, item, self.settings)
+        return way, self._beside(self.walls, way)
+
+    def push(self, segment: PushSegment) -> Array:
+        """What to keep off in a push."""
+        return self._beside(self.walls, segment.trajectory)
+
+    def retreat(self, robot: Array, item: Array) -> tuple[Trajectory, Array]:
+        """Away from the object, keeping off walls."""
+        way = motions.retreat(robot, lambda pose: self._gap(pose, item), self.walls, self.settings)
+        return way, self._beside(self.walls, way)
+
+    def _gap(self, robot: Array, item: Array) -> float:
+        return gap(self._outline, robot, self._item_outline, item)
+
+    def _beside(self, circles: Array, way: Trajectory) -> Array:
+        reach = _LOOK_AHEAD * self.robot.max_speed
+        return motions.spared(motions.near(circles, way, reach), way)

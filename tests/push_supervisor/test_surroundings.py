@@ -1,0 +1,135 @@
+"""Goals at the door, motions beside walls, other bodies: against the geometry they stand for."""
+
+import numpy as np
+import pytest
+
+from push_model import CurvatureLimits, PushSegment, line, se2
+from push_model.jobs import GoalRefused, JobError
+from push_model.occupancy import rasterise
+from push_model.specs import BoxSpec, EnvironmentSpec
+from push_supervisor import SupervisorSettings, Surroundings
+from push_supervisor.footprint import gap
+
+SETTINGS = SupervisorSettings()
+OPEN = EnvironmentSpec((3.0, 2.0))
+WALLED = EnvironmentSpec((3.0, 2.0), boxes=(BoxSpec((0.5, 0.0), (0.1, 0.6)),))
+
+
+@pytest.fixture
+def around(robot, box):
+    around = Surroundings(robot, box, {"other": 0.06, "crate": 0.2}, SETTINGS)
+    around.take_map(rasterise(WALLED))
+    return around
+
+
+def push(robot, box, begin, length=0.4):
+    """Straight ahead with the robot at a pose."""
+    grasp = np.array([robot.push_distance - box.outline[:, 0].min(), 0.0, 0.0])
+    way = line(begin, length, 0.07, 0.1)
+    end = way.pose[-1]
+    wait = se2.compose(begin, np.array([-0.06, 0.0, 0.0]))
+    items = se2.compose(begin, grasp), se2.compose(end, grasp)
+    limits = CurvatureLimits(-2.0, 2.0)
+    return PushSegment(0, *items, begin, end, wait, 0.5, 0.5, length, limits, 0.1, way)
+
+
+@pytest.mark.parametrize(
+    ("goal", "code"),
+    [
+        ([0.5, 0.1, 0.3], JobError.GOAL_OCCUPIED),
+        ([0.41, 0.0, 0.0], JobError.GOAL_OCCUPIED),  # a corner in the wall
+        ([1.47, 0.0, 0.0], JobError.GOAL_OCCUPIED),
+        ([3.0, 0.0, 0.0], JobError.OUTSIDE_MAP),
+    ],
+)
+def test_a_goal_that_cannot_be_is_refused_with_its_code(around, goal, code):
+    with pytest.raises(GoalRefused) as refusal:
+        around.check_goal(np.array(goal))
+    assert refusal.value.code is code and "(" in str(refusal.value)
+
+
+def test_a_goal_beside_a_wall_is_taken_and_without_a_map_any(around, robot, box):
+    around.check_goal(np.array([0.39, 0.0, 0.0]))  # 15 mm
+    Surroundings(robot, box, {}, SETTINGS).check_goal(np.array([0.5, 0.0, 0.0]))
+
+
+def test_touching_is_nearer_than_after_backing_off(around, robot):
+    contact = robot.push_distance + 0.045
+    item = np.array([-0.5, 0.1, 0.4])
+    for away, expected in ((0.0, True), (0.03, True), (0.055, False), (0.3, False)):
+        back = np.array([-contact - away, 0.0, 0.0])
+        assert around.touching(se2.compose(item, back), item) == expected
+    # beside a long way from the middle, with its back to the object, and on top of it
+    assert around.touching(se2.compose(item, np.array([0.0, 0.1, 0.0])), item)
+    assert around.touching(se2.compose(item, np.array([contact, 0.0, 0.0])), item)
+    assert around.touching(item, item)
+
+
+def test_a_retreat_leads_away_from_the_object(around, robot, box):
+    """From anywhere about the object, on a free floor, facing it more or less."""
+    random = np.random.default_rng(1)
+    near = 0
+    for _ in range(200):
+        item = np.array([-0.6, 0.0, random.uniform(-4, 4)])
+        bearing, apart = random.uniform(-4, 4), random.uniform(0.095, 0.14)
+        place = item[:2] + apart * np.array([np.cos(bearing), np.sin(bearing)])
+        pose = np.array([*place, bearing + np.pi + random.normal(0.0, 0.15)])
+        before = gap(robot.outline, pose, box.outline, item)
+        if before == 0.0 or not around.touching(pose, item):
+            continue
+        near += 1
+        way, _ = around.retreat(pose, item)
+        after = gap(robot.outline, way.pose[-1], box.outline, item)
+        assert after > before + 0.03
+    assert near > 50
+
+
+def test_walls_are_kept_on_the_approach(around, robot, box):
+    """The object is touched, walls are not; a circle at the end is as wide as the end allows."""
+    item = np.array([0.2, 0.0, 0.0])
+    contact = robot.push_distance + 0.045
+    segment = push(robot, box, item - [contact, 0.0, 0.0], 0.1)
+    way, circles = around.approach(segment, item - [contact + 0.06, 0.0, 0.0], item)
+    assert len(circles) > 3
+    wall = robot.body_radius + SETTINGS.obstacle_margin + 0.005
+    assert circles[:, 2] == pytest.approx(wall)
+    assert np.hypot(*(circles[:, :2] - item[:2]).T).min() > 0.1  # none stands for the object
+    beside = np.array([0.409, 0.0, np.pi / 2])  # 4 mm from the face: nearer than the robot's own
+    segment = push(robot, box, beside, 0.1)
+    way, circles = around.approach(segment, beside - [0.0, 0.06, 0.0], segment.object_start)
+    near = np.hypot(*(circles[:, :2] - way.pose[-1, :2]).T)
+    assert (near >= circles[:, 2] - 1e-9).all() and circles[:, 2].min() < wall
+
+
+def test_the_way_goes_round_the_object_and_the_other_bodies(around, robot, box):
+    item = np.array([-0.5, 0.0, 0.0])
+    poses = {"other": np.array([0.0, 0.5, 1.0]), "crate": None}
+    circles = around.on_the_way(item, poses)
+    reach = robot.footprint_radius
+    radius = box.geometry.circumradius
+    assert circles == pytest.approx(
+        np.array([[-0.5, 0.0, radius + reach], [0.0, 0.5, 0.06 + reach]])
+    )
+    assert around.bodies(poses) == pytest.approx(np.array([[0.0, 0.5, 0.06]]))
+    assert around.bodies({}).shape == (0, 3)
+    way = line(np.array([-0.8, 0.0, 0.0]), 0.1, 0.1, 0.1)
+    kept = around.follow(way, item)
+    assert kept[-1] == pytest.approx([-0.5, 0.0, radius + robot.body_radius + 0.008])
+
+
+def test_a_plan_is_blocked_by_what_it_would_run_into(around, robot, box):
+    ahead = push(robot, box, np.array([-0.6, 0.0, 0.0]), 0.4)
+    into = push(robot, box, np.array([-0.1, 0.1, 0.0]), 0.6)
+    past = push(robot, box, np.array([-0.1, 0.5, 0.0]), 0.6)
+    assert around.blocked([ahead, past]) == "" == around.blocked([])
+    assert "push 2 meets an obstacle" in around.blocked([ahead, into])
+
+
+def test_a_map_is_new_when_it_differs(around, robot):
+    before = around.walls
+    assert not around.take_map(rasterise(WALLED))
+    assert np.array_equal(before, around.walls)
+    assert around.take_map(rasterise(OPEN))
+    assert len(around.walls) < len(before)
+    around.change_settings(SupervisorSettings(obstacle_margin=0.02))
+    assert around.walls[0, 2] == pytest.approx(robot.body_radius + 0.02 + 0.005)
