@@ -1,6 +1,7 @@
 """The planner node: the PlanPush action and the PlanRobotPath service."""
 
 import math
+import sys
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -36,6 +37,7 @@ from push_ros.conversions import (
 from push_ros.diagnostics import Diagnostics
 from push_ros.names import names_of
 from push_ros.parameters import declare_settings
+from push_ros.process import run_node
 from push_ros.qos import LATCHED
 from push_ros.validation import FRAME, InvalidMessage, planar_pose
 from push_scenario.scenario import Scenario, load_scenario
@@ -267,3 +269,12 @@ class PlannerNode(Node):
             "last plan time": f"{self.last_time:.3f} s",
             "warning": "" if self._grid is not None else "no map yet",
         }
+
+
+def main() -> int:
+    """Entry point of the process: ``--ros-args`` on its command line."""
+    return run_node(PlannerNode)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

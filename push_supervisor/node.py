@@ -1,5 +1,6 @@
 """The supervisor node: goals in, plans and trajectories out, one state machine in between."""
 
+import sys
 import time
 from typing import Any
 
@@ -36,6 +37,7 @@ from push_ros.job_intake import JobIntake
 from push_ros.names import names_of
 from push_ros.parameters import declare_settings
 from push_ros.pose_feed import Frame, PoseFeed
+from push_ros.process import run_node
 from push_ros.qos import LATCHED, STREAM
 from push_ros.validation import FRAME, InvalidMessage
 from push_scenario.scenario import Scenario, load_scenario
@@ -568,3 +570,12 @@ class SupervisorNode(Node):
             "pose jumps": self._poses.gate.jumps,
             "warning": "no poses" if self._pose(self.object) is None else "",
         }
+
+
+def main() -> int:
+    """Entry point of the process: ``--ros-args`` on its command line."""
+    return run_node(SupervisorNode)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
