@@ -123,19 +123,20 @@ def _absolute(namespace: str) -> str:
 def single(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
     """One robot that pushes one object, for each team; all in one world.
 
-    Without teams the first robot pushes the first object, further robots stand.
+    A robot or object of no team stands in the way of the others.
 
     Raises
     ------
-    SettingsError: a team has several robots, or no object.
+    SettingsError: a team has not one robot, or no object.
     """
     world = _absolute(namespace)
     nodes = [NodeSpec("bridge", "bridge", world, world)]
     for team in teams_of(scenario):
-        if team.name and len(team.robots) != 1:
+        if len(team.robots) != 1:
+            whose = f"team '{team.name}'" if team.name else "its only team"
             raise SettingsError(
-                f"scenario '{scenario.name}': team '{team.name}' has {len(team.robots)} robots, "
-                "the system 'single' takes one a team"
+                f"scenario '{scenario.name}': {whose} has {len(team.robots)} robots, the system "
+                "'single' takes one a team; say under 'teams' who moves what"
             )
         if not team.object:
             raise SettingsError(f"scenario '{scenario.name}' has no object to push")

@@ -58,8 +58,8 @@ class PlayerNode(Node):
         scenario, metadata = bag_scenario(bag)
         recorded = shown_topics(scenario, metadata.get("namespace", ""))
         shown = shown_topics(scenario, names.world_space)
-        self._publishers: dict[str, Any] = {
-            source: self._publisher(topic, kind)
+        self._outputs: dict[str, Any] = {
+            source: self._output(topic, kind)
             for source, (topic, kind) in zip(recorded, shown.items(), strict=True)
         }
         self._records: Iterator[RawRecord] = read_raw(bag, set(recorded))
@@ -71,15 +71,13 @@ class PlayerNode(Node):
         self._begin = moment() + _LISTEN
         self.played = 0
         topic = names.world("scenario")
-        self._scenario_publisher = next(
-            p for p in self._publishers.values() if p.topic_name == topic
-        )
+        self._scenario_publisher = next(p for p in self._outputs.values() if p.topic_name == topic)
         self._scenario_publisher.publish(String(data=scenario.text))
         self._timer = self.create_timer(
             _PERIOD, self._on_timer, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
 
-    def _publisher(self, topic: str, kind: Topic) -> Any:
+    def _output(self, topic: str, kind: Topic) -> Any:
         return self.create_publisher(kind.message, topic, kind.qos)
 
     @property
@@ -95,7 +93,7 @@ class PlayerNode(Node):
     def _on_timer(self) -> None:
         elapsed = self._factor * (self._moment() - self._begin)
         while self._next is not None and self._due(self._next.stamp) <= elapsed:
-            self._publishers[self._next.topic].publish(bytes(self._next.data))
+            self._outputs[self._next.topic].publish(bytes(self._next.data))
             self.played += 1
             self._next = next(self._records, None)
 

@@ -22,15 +22,16 @@ from push_scenario.scenario import Scenario, load_scenario, scenario_from_text
 _PATIENCE = 5.0  # [s] wall time that the scenario has to be heard
 
 
-def heard_scenario(namespace: str = "", limit: float = _PATIENCE) -> Scenario:
+def heard_scenario(namespace: str = "", limit: float | None = None) -> Scenario:
     """The scenario that the bridge of a namespace publishes.
 
     Raises
     ------
-    SettingsError: none is heard within limit [s] of wall time; says what to do.
+    SettingsError: none is heard within limit [s] of wall time, a few seconds when it is not given;
+        says what to do.
     """
     topic = names_in(namespace)
-    message = hear_latched(String, topic, limit)
+    message = hear_latched(String, topic, _PATIENCE if limit is None else limit)
     if message is None:
         raise SettingsError(
             f"nobody publishes a scenario on {topic}; start a suite, or name it with --scenario"

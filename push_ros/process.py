@@ -111,7 +111,9 @@ class Spinner:
     def __init__(self, nodes: Sequence[Node], context: Any = None) -> None:
         self.nodes = list(nodes)
         self._context = context
-        self.executor = EventsExecutor(context=context)
+        # It wants a standard error that is a file, which that of a notebook is not.
+        with contextlib.redirect_stderr(sys.__stderr__):
+            self.executor = EventsExecutor(context=context)
         for node in self.nodes:
             self.executor.add_node(node)
 
@@ -135,12 +137,13 @@ class Spinner:
         return True
 
     def close(self) -> None:
-        """Destroy the nodes."""
+        """Destroy the nodes. An executor that is left open keeps them in the graph."""
         for node in self.nodes:
             self.executor.remove_node(node)
             with contextlib.suppress(Exception):
                 node.destroy_node()
         self.nodes.clear()
+        self.executor.shutdown()
 
 
 def run_node(make: Callable[[], Node], arguments: Sequence[str] | None = None) -> int:
