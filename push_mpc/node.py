@@ -1,6 +1,7 @@
 """The controller node: follows trajectories with the LTV-MPC, driven by the pose stream."""
 
 import math
+import sys
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,7 @@ from push_ros.heartbeat import HeartbeatWatch
 from push_ros.names import inside, names_of_robot
 from push_ros.parameters import declare_settings
 from push_ros.pose_feed import Frame, PoseFeed
+from push_ros.process import run_node
 from push_ros.qos import COMMAND, STATUS
 from push_ros.validation import FRAME, InvalidMessage, check_frame, finite, planar_pose
 from push_scenario.scenario import Scenario, load_scenario
@@ -334,3 +336,12 @@ class ControllerNode(Node):
             "pose jumps": self._poses.gate.jumps,
             "warning": "poses are stale" if stale else "",
         }
+
+
+def main() -> int:
+    """Entry point of the process: ``--ros-args`` on its command line."""
+    return run_node(ControllerNode)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
