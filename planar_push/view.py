@@ -16,23 +16,20 @@ def add_words(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Serve until a signal."""
-    from push_record.recorder import heard_scenario
+    """Serve until a signal. Which bodies there are is heard from the bridge."""
     from push_ros.process import run_node
     from push_scenario.scenario import load_scenario
-    from push_view.viewer import ViewerNode, ViewerServer
+    from push_view.page_server import PageServer
+    from push_view.viewer_node import ViewerNode
 
     check_namespace(arguments.namespace)
-    if arguments.scenario:
-        scenario = load_scenario(arguments.scenario)
-    else:
-        scenario = heard_scenario(arguments.namespace)
-    server: ViewerServer | None = None
+    scenario = load_scenario(arguments.scenario) if arguments.scenario else None
+    server: PageServer | None = None
 
     def make() -> ViewerNode:
         nonlocal server
         node = ViewerNode(scenario)
-        server = ViewerServer(node, arguments.host, arguments.port)
+        server = PageServer(node, arguments.host, arguments.port)
         print(f"http://{arguments.host}:{server.port}/", flush=True)
         return node
 

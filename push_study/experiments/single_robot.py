@@ -27,7 +27,9 @@ from push_study.observer import Trace, final_errors
 from push_study.pool import Row
 from push_study.study import StudyOptions
 from push_study.thesis import TABLE_2_1
-from push_view.report import draw_map, outlines_of, write_report
+from push_view.bodies import bodies_of
+from push_view.drawing import draw_map
+from push_view.report import write_report
 
 SCENARIOS = ("env1-target1",)
 """Where none are named."""
@@ -224,9 +226,8 @@ def _print_table(rows: list[Row], scenarios: list[str]) -> None:
 def _plot(name: str, rows: list[Row], traces: list[Path], out: Path) -> None:
     scenario = load_scenario(name)
     figure, axes = plt.subplots(figsize=(9, 6))
-    draw_map(axes, scenario)
-    outlines = outlines_of(scenario)
-    item = next(iter(scenario.objects))
+    draw_map(axes, scenario.grid)
+    outline = bodies_of(scenario).type(next(iter(scenario.objects))).outline
     good_seeds = {r["seed"] for r in rows if r["success"]}
     for path in traces:
         if path.is_file():
@@ -235,11 +236,9 @@ def _plot(name: str, rows: list[Row], traces: list[Path], out: Path) -> None:
             axes.plot(
                 way[:, 0], way[:, 1], lw=0.8, alpha=0.7, color="#2a62c9" if good else "#c22f3d"
             )
-            axes.fill(*se2.transform(way[-1], outlines[item][0]).T, fill=False, lw=0.7)
+            axes.fill(*se2.transform(way[-1], outline).T, fill=False, lw=0.7)
     if scenario.goal is not None:
-        axes.fill(
-            *se2.transform(scenario.goal, outlines[item][0]).T, fill=False, lw=1.6, color="#c22f3d"
-        )
+        axes.fill(*se2.transform(scenario.goal, outline).T, fill=False, lw=1.6, color="#c22f3d")
     axes.set_title(f"{scenario.name}: {len(good_seeds)} of {len(rows)} trials succeed")
     figure.savefig(out / f"{scenario.name}.png", dpi=130, bbox_inches="tight")
     plt.close(figure)
