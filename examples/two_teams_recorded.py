@@ -6,7 +6,8 @@ from pathlib import Path
 
 from push_bringup.job_result import JobEvent
 from push_bringup.suite import Suite
-from push_record.contents import load_contents
+from push_record.contents import load
+from push_view.report import final_error
 
 
 def tell(event: JobEvent) -> None:
@@ -20,9 +21,10 @@ def main(factor: float = 1.0) -> bool:
         bag = Path(folder) / "bag"
         with Suite("two-singles", record=bag, factor=factor, on_event=tell) as suite:
             results = suite.reach_all()
-        contents = load_contents(bag)
+        contents = load(bag)
     for name, result in results.items():
-        print(result, f"by the ground truth: {1e3 * contents.final_error(name)[0]:.1f} mm")
+        truth = final_error(contents, contents.jobs[f"/{name}/"])
+        print(result, f"by the ground truth: {truth}")
     return all(r.success for r in results.values())
 
 

@@ -16,14 +16,13 @@ def add_words(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Serve until a signal."""
+    """Serve until a signal. Which bodies there are is heard from the bridge."""
     from push_ros.process import run_node
     from push_scenario.scenario import load_scenario
     from push_view.page_server import PageServer
     from push_view.viewer_node import ViewerNode
 
     check_namespace(arguments.namespace)
-    # without one the page waits for the scenario that the bridge tells
     scenario = load_scenario(arguments.scenario) if arguments.scenario else None
     server: PageServer | None = None
 

@@ -1,18 +1,17 @@
-"""What a bag holds, as time series: for reports, figures and tests."""
+"""What a bag holds, as time series: bodies, jobs of all teams, controllers, collisions."""
 
+from collections.abc import Container
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
-from push_model import se2
 from push_model.arrays import Array
 from push_record.bag import read_bag, read_metadata
-from push_record.topics import team_names
-from push_ros.validation import planar_pose
+from push_record.collisions import Collisions
+from push_ros.validation import InvalidMessage, planar_pose
 from push_scenario.scenario import Scenario, scenario_from_text
-from push_scenario.teams import Team
 
 STATUS = (
     "time",
@@ -24,73 +23,99 @@ STATUS = (
     "obstacle_margin",
     "object_offset_y",
 )
-"""Columns of a robot's status; fields of ``ControllerStatus``."""
+"""Columns of a controller's status, see push_msgs/ControllerStatus."""
 
-_WORKING = (1, 2)  # modes of a controller that follows a trajectory
+_SPACING = 0.02  # [s] least, between frames that are kept
+_MOVING = (1, 2)  # modes MOVE and PUSH of ControllerStatus
+
+
+@dataclass(frozen=True)
+class State:
+    """Of a job, at a time [s]; code: of the last job that ended."""
+
+    time: float
+    name: str
+    reason: str
+    code: int
 
 
 @dataclass
-class TeamContents:
-    """What a team did. states: (time [s], state, reason); plan: ways ``(n, 2)`` [m] of its pushes;
-    goal ``(3,)``: the last one; status ``(n, 8)``: of its first robot, columns ``STATUS``."""
+class Job:
+    """What a team did. goal ``(3,)``: the last one; plan: ``(n, 2)`` [m] of each push's axle."""
 
-    team: Team
-    states: list[tuple[float, str, str]] = field(default_factory=list)
-    plan: list[Array] = field(default_factory=list)
+    space: str
+    system: str = ""
+    robots: tuple[str, ...] = ()
+    object: str = ""
+    states: list[State] = field(default_factory=list)
     goal: Array | None = None
-    status: Array = field(default_factory=lambda: np.zeros((0, len(STATUS))))
+    plan: list[Array] = field(default_factory=list)
 
 
 @dataclass
 class BagContents:
-    """Ground truth of a bag: time ``(n,)`` [s] and poses ``(n, 3)`` by body; and its teams.
+    """time ``(n,)`` [s]; poses ``(n, 3)`` by body, ground truth, nan where it is not told.
 
-    collisions: contacts of a body with what is none, e.g. a wall; one a message and pair.
+    status: by robot, by column of STATUS ``(k,)``; jobs: by the team's namespace.
     """
 
     scenario: Scenario
     metadata: dict[str, str]
-    teams: dict[str, TeamContents]
+    collisions: Collisions
     time: Array = field(default_factory=lambda: np.zeros(0))
     poses: dict[str, Array] = field(default_factory=dict)
-    collisions: int = 0
+    status: dict[str, dict[str, Array]] = field(default_factory=dict)
+    jobs: dict[str, Job] = field(default_factory=dict)
 
-    def team(self, name: str = "") -> TeamContents:
-        """Of a team; of the first when no name is given."""
-        return self.teams[name or next(iter(self.teams))]
 
-    @property
-    def status(self) -> Array:
-        """Of the first team."""
-        return self.team().status
+class _Suffixes(Container[str]):
+    """Topics by how their names end, whatever the namespace."""
 
-    @property
-    def states(self) -> list[tuple[float, str, str]]:
-        """Of the first team."""
-        return self.team().states
+    def __init__(self, *suffixes: str) -> None:
+        self._suffixes = tuple(f"/{s}" for s in suffixes)
 
-    @property
-    def plan(self) -> list[Array]:
-        """Of the first team."""
-        return self.team().plan
-
-    @property
-    def goal(self) -> Array | None:
-        """Of the first team."""
-        return self.team().goal
-
-    def final_error(self, team: str = "") -> tuple[float, float]:
-        """Position [m] and orientation [rad] error of a team's object at the end; nan unknown."""
-        contents = self.team(team)
-        way = self.poses.get(contents.team.object, np.zeros((0, 3)))
-        if contents.goal is None or not len(way):
-            return float("nan"), float("nan")
-        local = se2.between(contents.goal, way[-1])
-        return float(np.hypot(local[0], local[1])), abs(float(local[2]))
+    def __contains__(self, topic: object) -> bool:
+        return str(topic).endswith(self._suffixes)
 
 
 def _seconds(stamp: Any) -> float:
     return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
+
+
+class _Frames:
+    """Frames of poses on their way into arrays."""
+
+    def __init__(self, names: tuple[str, ...]) -> None:
+        self._index = {name: i for i, name in enumerate(names)}
+        self.times: list[float] = []
+        self.frames: list[Array] = []
+        self._last: tuple[float, Array] | None = None
+
+    def take(self, message: Any) -> None:
+        frame = np.full((len(self._index), 3), np.nan)
+        known = [(self._index[n], i) for i, n in enumerate(message.names) if n in self._index]
+        if known:
+            rows, columns = np.array(known).T
+            frame[rows] = np.column_stack([message.x, message.y, message.theta])[columns]
+        time = _seconds(message.header.stamp)
+        self._last = (time, frame)
+        if not self.times or not 0.0 <= time - self.times[-1] < _SPACING - 1e-9:
+            self._keep()
+
+    def finish(self) -> tuple[Array, dict[str, Array]]:
+        """Times and poses by name, the last frame among them."""
+        self._keep()
+        if not self.frames:
+            return np.zeros(0), {}
+        table = np.array(self.frames)
+        seen = {name: table[:, i] for name, i in self._index.items()}
+        return np.array(self.times), {n: p for n, p in seen.items() if np.isfinite(p).any()}
+
+    def _keep(self) -> None:
+        if self._last is not None:
+            self.times.append(self._last[0])
+            self.frames.append(self._last[1])
+            self._last = None
 
 
 def bag_scenario(bag: Path) -> tuple[Scenario, dict[str, str]]:
@@ -98,7 +123,7 @@ def bag_scenario(bag: Path) -> tuple[Scenario, dict[str, str]]:
 
     Raises
     ------
-    ValueError: the bag holds no scenario.
+    ValueError: the bag holds no scenario. FileNotFoundError: it is none.
     """
     metadata = read_metadata(bag)
     if "scenario" not in metadata:
@@ -107,62 +132,54 @@ def bag_scenario(bag: Path) -> tuple[Scenario, dict[str, str]]:
     return scenario_from_text(metadata["scenario"], name, str(bag)), metadata
 
 
-def load_contents(bag: Path) -> BagContents:
-    """Read a bag, of one world and all its teams, wherever in the graph they were.
+def load(bag: Path) -> BagContents:
+    """Read what a report shows.
 
     Raises
     ------
-    ValueError: the bag holds no scenario.
+    ValueError: the bag holds no scenario. FileNotFoundError: it is none.
     """
     scenario, metadata = bag_scenario(bag)
-    names = team_names(scenario, metadata.get("namespace", ""))
-    world = next(iter(names.values()))
-    teams = {n: TeamContents(scenario.team(n)) for n in names}
-    contents = BagContents(scenario, metadata, teams)
-    bodies = set(scenario.robots) | set(scenario.objects)
-    truth, touches = world.world("ground_truth/poses"), world.world("contacts")
-    states = {n.team("job_state"): teams[t] for t, n in names.items()}
-    plans = {n.team("push_plan"): teams[t] for t, n in names.items()}
-    status = {
-        world.robot(t.team.robots[0], "controller/status"): t
-        for t in teams.values()
-        if t.team.robots
-    }
-    rows: dict[str, list[list[float]]] = {topic: [] for topic in status}
-    times: list[float] = []
-    poses: dict[str, list[tuple[float, float, float]]] = {}
-    for record in read_bag(bag, {truth, touches, *states, *plans, *status}):
-        m, topic = record.message, record.topic
-        if topic == truth:
-            times.append(_seconds(m.header.stamp))
-            for name, *pose in zip(m.names, m.x, m.y, m.theta, strict=True):
-                poses.setdefault(name, []).append((pose[0], pose[1], pose[2]))
-        elif topic in status:
-            if m.mode in _WORKING:
-                rows[topic].append(
-                    [_seconds(m.header.stamp), *(float(getattr(m, k)) for k in STATUS[1:])]
-                )
-        elif topic in states:
-            team = states[topic]
-            team.states.append((_seconds(m.header.stamp), m.state_name, m.reason))
-            if m.goal.header.frame_id:
-                team.goal = planar_pose(m.goal.pose)
-        elif topic in plans:
-            plans[topic].plan = [
-                np.column_stack([s.trajectory.x, s.trajectory.y]) for s in m.segments
-            ]
+    collisions = Collisions(frozenset(scenario.robots), frozenset(scenario.objects))
+    contents = BagContents(scenario, metadata, collisions)
+    frames = _Frames((*scenario.robots, *scenario.objects))
+    status: dict[str, list[list[float]]] = {}
+    wanted = _Suffixes(
+        "ground_truth/poses", "job_state", "push_plan", "contacts", "controller/status"
+    )
+    for record in read_bag(bag, cast(set[str], wanted)):
+        m = record.message
+        if record.topic.endswith("/ground_truth/poses"):
+            frames.take(m)
+        elif record.topic.endswith("/controller/status"):
+            if m.mode in _MOVING:
+                row = [_seconds(m.header.stamp), *(getattr(m, k) for k in STATUS[1:])]
+                status.setdefault(str(m.robot), []).append(row)
+        elif record.topic.endswith("/contacts"):
+            collisions.take(_seconds(m.header.stamp), m.body_a, m.body_b)
         else:
-            contents.collisions += sum(
-                1
-                for pair in map(set, zip(m.body_a, m.body_b, strict=True))
-                if pair & bodies and not pair <= bodies
-            )
-    count = min([len(times), *(len(p) for p in poses.values())]) if poses else 0
-    contents.time = np.array(times[:count])
-    contents.poses = {k: np.array(v[:count]).reshape(-1, 3) for k, v in poses.items()}
-    for topic, team in status.items():
-        team.status = np.array(rows[topic]).reshape(-1, len(STATUS))
-    for team in teams.values():
-        if team.goal is None:
-            team.goal = team.team.goal
+            space = record.topic.rpartition("/")[0] + "/"
+            job = contents.jobs.setdefault(space, Job(space))
+            if record.topic.endswith("/job_state"):
+                _take_state(job, m)
+            else:
+                job.plan = [np.column_stack([s.trajectory.x, s.trajectory.y]) for s in m.segments]
+    contents.time, contents.poses = frames.finish()
+    for robot, rows in status.items():
+        table = np.array(rows, dtype=np.float64)
+        contents.status[robot] = dict(zip(STATUS, table.T, strict=True))
     return contents
+
+
+def _take_state(job: Job, message: Any) -> None:
+    job.system, job.object = str(message.system), str(message.object)
+    job.robots = tuple(str(r) for r in message.robots)
+    stamp = _seconds(message.header.stamp)
+    job.states.append(
+        State(stamp, str(message.state_name), str(message.reason), int(message.error_code))
+    )
+    if message.goal.header.frame_id:
+        try:
+            job.goal = planar_pose(message.goal.pose, "the goal")
+        except InvalidMessage:  # what somebody recorded need not be right
+            pass

@@ -9,8 +9,8 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from PIL import Image
 
+from push_record.contents import BagContents
 from push_view.bodies import bodies_of
-from push_view.contents import BagContents
 from push_view.drawing import INK, body_vertices, draw_jobs, draw_map
 
 _RATE = 15.0  # [Hz] pictures

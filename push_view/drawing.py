@@ -11,8 +11,8 @@ from matplotlib.patches import Polygon
 from push_model import se2
 from push_model.arrays import Array
 from push_model.occupancy import OccupancyGrid
+from push_record.contents import BagContents, Job
 from push_view.bodies import Bodies, bodies_of
-from push_view.contents import BagContents, Job
 
 PLAN, GOAL, INK = "#777777", "#c22f3d", "#222222"
 

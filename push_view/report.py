@@ -13,8 +13,8 @@ import numpy as np
 from matplotlib.backends.backend_pdf import PdfPages
 
 from push_model import se2
+from push_record.contents import BagContents, Job, load
 from push_view.animation import write_animation
-from push_view.contents import BagContents, Job, load
 from push_view.drawing import INK, draw_trajectory
 from push_view.panels import panel_of
 

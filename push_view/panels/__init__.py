@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol, cast
 from push_ros.names import Names
 
 if TYPE_CHECKING:
-    from push_view.contents import BagContents, Job
+    from push_record.contents import BagContents, Job
 
 
 class LivePanel(Protocol):

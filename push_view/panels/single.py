@@ -11,7 +11,7 @@ from push_ros.names import Names
 from push_ros.qos import STATUS
 
 if TYPE_CHECKING:
-    from push_view.contents import BagContents, Job
+    from push_record.contents import BagContents, Job
 
 _FAR = 50.0  # [1/m] margins above are no margins but free motion
 _REST = 1.0  # [s] without status after which the controller has rested

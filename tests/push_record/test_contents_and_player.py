@@ -8,7 +8,7 @@ from std_msgs.msg import String
 from push_model.settings import SettingsError
 from push_msgs.msg import ControllerStatus, JobState, Poses
 from push_record.bag import BagWriter, read_bag
-from push_record.contents import STATUS, load_contents
+from push_record.contents import load
 from push_record.player import PlayerNode
 from push_record.recorder import RecorderNode, heard_scenario
 from push_record.topics import MANY, recorded_topics, shown_topics
@@ -48,7 +48,7 @@ def write_bag(folder, scenario, namespace="/a/", count=50):
         bodies |= {n: s + [0.01 * k, 0.0, 0.0] for n, (_, s) in scenario.objects.items()}
         for topic in ("poses", "ground_truth/poses"):
             put(topic, moment, poses_to_ros(bodies, moment))
-        status = ControllerStatus(mode=ControllerStatus.PUSH, error_y=0.001 * k)
+        status = ControllerStatus(mode=ControllerStatus.PUSH, robot="epuck2", error_y=0.001 * k)
         status.header.stamp = time_to_ros(moment)
         put("epuck2/controller/status", moment, status)
     state.header.stamp = time_to_ros(1.5)
@@ -59,27 +59,25 @@ def write_bag(folder, scenario, namespace="/a/", count=50):
 
 def test_contents_by_team(tmp_path, teams):
     write_bag(tmp_path / "bag", teams)
-    contents = load_contents(tmp_path / "bag")
-    assert list(contents.teams) == ["south", "north"] and contents.metadata["seed"] == "3"
+    contents = load(tmp_path / "bag")
+    assert contents.metadata["seed"] == "3"
     assert len(contents.time) == 50 and set(contents.poses) == {*teams.robots, *teams.objects}
-    south, north = contents.team("south"), contents.team("north")
-    assert contents.team() is south and contents.states == south.states
-    assert south.states == [(1.5, "PUSHING", "as told")]
-    assert np.allclose(south.goal, [0.5, -0.4, 0.0])
-    assert np.allclose(north.goal, teams.team("north").goal)  # none was sent: the scenario's
-    assert south.status.shape == (0, len(STATUS)) and north.status.shape == (50, len(STATUS))
-    assert np.allclose(north.status[:, 2], 0.001 * np.arange(50))
+    assert set(contents.jobs) == {"/a/south/", "/a/north/"}
+    south, north = contents.jobs["/a/south/"], contents.jobs["/a/north/"]
+    assert [(s.time, s.name, s.reason) for s in south.states] == [(1.5, "PUSHING", "as told")]
+    assert np.allclose(south.goal, [0.5, -0.4, 0.0]) and south.object == "box1"
+    assert north.goal is None and north.object == "box2"
+    assert set(contents.status) == {"epuck2"}
+    assert np.allclose(contents.status["epuck2"]["error_y"], 0.001 * np.arange(50))
     end = teams.objects["box1"][1] + [0.49, 0.0, 0.0]
     assert np.allclose(contents.poses["box1"][-1], end)
-    expected = np.hypot(*(np.array([0.5, -0.4]) - end[:2]))
-    assert contents.final_error("south")[0] == pytest.approx(expected)
 
 
 def test_a_bag_without_scenario_is_refused(tmp_path):
     writer = BagWriter(tmp_path / "bag", {"seed": "1"})
     writer.close()
     with pytest.raises(ValueError, match="no scenario"):
-        load_contents(tmp_path / "bag")
+        load(tmp_path / "bag")
 
 
 @pytest.mark.parametrize("namespace", ["", "b"])
@@ -148,7 +146,7 @@ def test_the_recorder_hears_scenario_and_all_teams_of_its_namespace(tmp_path, te
     spinner.close()
     reasons = [r.message.reason for r in read_bag(tmp_path / "bag", {topic})]
     assert reasons == ["of the north"]
-    assert load_contents(tmp_path / "bag").metadata["namespace"] == "/a/"
+    assert load(tmp_path / "bag").metadata["namespace"] == "/a/"
 
 
 def test_topics_of_one_of_teams_and_of_very_many(teams):

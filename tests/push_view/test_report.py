@@ -9,10 +9,10 @@ from rclpy.serialization import serialize_message
 
 from push_msgs.msg import ControllerStatus, JobState
 from push_record.bag import BagWriter
+from push_record.collisions import Collisions
+from push_record.contents import load
 from push_ros.conversions import contacts_to_ros, pose_stamped_to_ros, poses_to_ros, time_to_ros
 from push_view.bodies import OBJECT, ROBOT, bodies_of
-from push_view.collisions import Collisions
-from push_view.contents import load
 from push_view.drawing import body_vertices, moments
 from push_view.panels import panel_of
 from push_view.report import PRODUCTS, final_error, write_report

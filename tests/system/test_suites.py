@@ -14,7 +14,8 @@ from push_bringup.launcher import Launcher
 from push_bringup.suite import Suite
 from push_model.jobs import JobError
 from push_record.bag import read_bag
-from push_record.contents import load_contents
+from push_record.contents import load
+from push_view.report import final_error
 
 pytestmark = pytest.mark.live
 ROOT = Path(__file__).resolve().parents[2]
@@ -28,9 +29,8 @@ def topics_outside(bag, namespace):
 def strangers_touched(contents, bag):
     """Pairs of bodies of different teams, and of a body and a wall, that touched."""
     teams = {}
-    for name, team in contents.teams.items():
-        for body in (*team.team.robots, team.team.object):
-            teams[body] = name
+    for name, team in contents.scenario.teams.items():
+        teams |= dict.fromkeys((*team.robots, team.object), name)
     namespace = contents.metadata["namespace"]
     found = set()
     for record in read_bag(bag, {f"{namespace}contacts"}):
@@ -63,8 +63,8 @@ def test_a_script_starts_a_suite_and_is_told_how_it_ended(domain, tmp_path, capf
         "pushing",
         "detaching",
     ]
-    contents = load_contents(result.bag)
-    assert contents.final_error()[0] < 0.02
+    contents = load(result.bag)
+    assert final_error(contents, contents.jobs["/"]).position < 0.02
     assert contents.scenario.parameters["planner"] == {"push_speed": 0.06}
     out, err = capfd.readouterr()
     assert out == "" and err == ""  # silent unless asked
@@ -107,13 +107,13 @@ def test_two_teams_side_by_side_in_one_world(domain, tmp_path):
     assert set(results) == {"south", "north"}
     for result in results.values():
         assert result.success and result.position_error < 0.02, result
-    contents = load_contents(tmp_path / "bag")
+    contents = load(tmp_path / "bag")
     assert not topics_outside(tmp_path / "bag", "a")
     assert not strangers_touched(contents, tmp_path / "bag")
     for name, result in results.items():
-        assert contents.final_error(name)[0] < 0.02
-        states = [s for _, s, _ in contents.team(name).states]
-        assert "PUSHING" in states and result.replans == 0
+        job = contents.jobs[f"/a/{name}/"]
+        assert final_error(contents, job).position < 0.02
+        assert "PUSHING" in [s.name for s in job.states] and result.replans == 0
 
 
 def test_two_suites_in_two_namespaces_of_one_domain(domain, tmp_path):
@@ -134,7 +134,8 @@ def test_two_suites_in_two_namespaces_of_one_domain(domain, tmp_path):
     for name, result in results.items():
         assert result.success and result.position_error < 0.02, result
         assert not topics_outside(bags[name], name)
-        assert load_contents(bags[name]).final_error()[0] < 0.02
+        contents = load(bags[name])
+        assert final_error(contents, contents.jobs[f"/{name}/"]).position < 0.02
 
 
 @pytest.mark.parametrize(
