@@ -12,7 +12,7 @@ from push_planner.guide_path import GuidePath, waypoints
 from push_planner.scene import PushScene
 
 _SAME_ANGLE = 0.05  # [rad]
-_BEND = 0.9  # of the trusted curvature, in runs that turn
+_BENDS = (0.0, -0.9, 0.9)  # of the trusted curvature, in runs
 _WIDEST = 1.0  # [m] beside Gamma at most, where poses are scattered
 
 
@@ -60,16 +60,25 @@ def along_guide(
     return Candidates(np.array(poses).reshape(-1, 3), np.array(way, dtype=np.float64))
 
 
-def runs(scene: PushScene, pose: Array, direction: float, way: float) -> Candidates:
+def runs(
+    scene: PushScene,
+    pose: Array,
+    direction: float,
+    way: float,
+    lengths: tuple[float, ...],
+    bends: tuple[float, ...] = _BENDS,
+) -> Candidates:
     """Ends of pushes out of a pose (direction 1), or starts of pushes into it (-1).
 
-    On each side and of each length, straight on and nearly as bent as plans may be.
+    On each side, of each length [m], and bent by these parts of the trusted curvature.
     """
     poses = []
     for side in scene.sides:
         contact = side.robot_pose(pose)
-        for curvature in (0.0, _BEND * side.trusted.minimum, _BEND * side.trusted.maximum):
-            for length in scene.settings.run_lengths:
+        for bend in bends:
+            limit = side.trusted.maximum if bend > 0.0 else side.trusted.minimum
+            curvature = abs(bend) * limit
+            for length in lengths:
                 step = direction * length
                 robot = unicycle_step(contact, step, step * curvature, 1.0)
                 poses.append(se2.compose(robot, side.grasp))

@@ -237,8 +237,10 @@ class PushPlanner:
         leaves waypoints out where the path is long."""
         scene = self.scene
         most = _WAYPOINTS * 2**attempt
-        candidates = runs(scene, start, 1.0, 0.0) + along_guide(scene, guide, start, goal, most)
-        candidates += runs(scene, goal, -1.0, guide.length)
+        lengths = self.settings.run_lengths
+        candidates = runs(scene, start, 1.0, 0.0, lengths)
+        candidates += along_guide(scene, guide, start, goal, most)
+        candidates += runs(scene, goal, -1.0, guide.length, lengths)
         candidates += scattered(scene, guide, count, work.random)
         spacing = max(self.settings.waypoint_spacing, guide.length / most)
         return PushGraph(scene, start, goal, candidates.free(scene), _REACH * spacing)
