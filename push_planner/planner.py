@@ -23,7 +23,7 @@ from push_planner.settings import PlannerSettings
 _WORTH = 0.002  # of the cost that a further plan must save
 _NEARBY = 40  # poses about each one that an improvement moves
 _WAYPOINTS = 30  # at most, in the first attempt
-_REACH = 10.0  # waypoints that a push leads on at most
+_REACH = (10.0, 3.0)  # waypoints that a push leads on at most: of the settings; of a long path
 
 
 class PlanError(IntEnum):
@@ -94,7 +94,7 @@ class _Work:
         self.random = np.random.default_rng(seed)
         self.statistics = SearchStatistics()
         self.iterations = 0
-        self.ways_out: int | None = None  # pushes found that lead away from the start
+        self.ways_out = self.ways_in = False  # whether any push leaves the start, ends at the goal
         self.left = settings.total_expansions
         self._most = settings.max_expansions
         self._clock = time.perf_counter()
@@ -194,12 +194,21 @@ class PushPlanner:
         for attempt, count in enumerate(settings.scattered_poses):
             guide = guides[attempt % len(guides)]
             graph = self._graph(start, goal, guide, attempt, count, work)
-            if attempt > 0:
-                work.ways_out = graph.leave(work.statistics)
-            search = PushSearch(graph, np.inf, settings.heuristic_weight, work.effort())
-            for _ in search.run(work.statistics):
-                yield Progress(f"push search {attempt + 1}", None)
-            work.left -= search.expanded
+            if not graph.leave(work.statistics, enough=1):
+                continue
+            work.ways_out = True
+            # Greedier when that does not end, and only by ways out of the start that there are;
+            # what has been tried is remembered.
+            for weight in (1.0, settings.heuristic_weight):
+                if weight > 1.0:
+                    graph.leave(work.statistics)
+                search = PushSearch(graph, np.inf, weight, work.effort())
+                for _ in search.run(work.statistics):
+                    yield Progress(f"push search {attempt + 1}", None)
+                work.left -= search.expanded
+                work.ways_in |= graph.arrivals > 0 or search.expanded == 0
+                if search.solution is not None or search.exhausted:
+                    break
             if search.solution is not None:
                 best = self._assemble(search, goal, guide, work)
                 break
@@ -243,7 +252,8 @@ class PushPlanner:
         candidates += runs(scene, goal, -1.0, guide.length, lengths)
         candidates += scattered(scene, guide, count, work.random)
         spacing = max(self.settings.waypoint_spacing, guide.length / most)
-        return PushGraph(scene, start, goal, candidates.free(scene), _REACH * spacing)
+        reach = max(_REACH[0] * self.settings.waypoint_spacing, _REACH[1] * spacing)
+        return PushGraph(scene, start, goal, candidates.free(scene), reach)
 
     def _check_room(self, pose: Array, what: str) -> None:
         """Raise PlanningFailed when the object can be pushed on no side at the pose ``(3,)``."""
@@ -275,11 +285,13 @@ class PushPlanner:
         """What the searches have found out."""
         statistics = work.statistics
         tried = f"{statistics.feasible} of {statistics.solved} pushes tried are free"
-        if work.ways_out == 0:
-            return (
-                f"no push leads away from the start ({start[0]:.3f}, {start[1]:.3f}, "
-                f"{start[2]:.3f}) without a collision; {tried}"
-            )
+        for found, pose, what in (
+            (work.ways_out, start, "leads away from the start"),
+            (work.ways_in, goal, "ends at the goal"),
+        ):
+            if not found:
+                where = f"({pose[0]:.3f}, {pose[1]:.3f}, {pose[2]:.3f})"
+                return f"no push {what} {where} without a collision; {tried}"
         return f"no sequence of pushes reaches the goal; {tried}"
 
     def solve(self, start: Array, goal: Array, seed: int | None = None) -> PushPlan:

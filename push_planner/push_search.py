@@ -98,6 +98,7 @@ class PushGraph:
         self._costs = (settings.push_cost, settings.side_change_cost)
         least = scene.shape.inradius + settings.safety_distance
         self._view = (self._shut, self.window, sight, least, scene.field.values, *scene.field.args)
+        self.arrivals = 0  # pushes found that end at the goal
         self._pushes: dict[tuple[int, int, int], PushStep | None] = {}
 
     def rough_costs(self, bound: float) -> tuple[Array, float]:
@@ -107,14 +108,16 @@ class PushGraph:
         )
         return ready, float(arrived[-1].min())
 
-    def leave(self, statistics: SearchStatistics) -> int:
-        """Try every push out of the start; guesses leave out from now on what cannot be made.
+    def leave(self, statistics: SearchStatistics, enough: float = math.inf) -> int:
+        """Try pushes out of the start, until ``enough`` are found; how many are.
 
-        Returns how many pushes there are.
+        Guesses leave out from now on those that cannot be made.
         """
         found = 0
         for side in range(len(self.scene.sides)):
             for pose in self._worth_leaving_for(side):
+                if found >= enough:
+                    return found
                 found += self.push(0, pose, side, statistics) is not None
         return found
 
@@ -166,8 +169,10 @@ class PushGraph:
         if key not in self._pushes:
             statistics.solved += 1
             self._pushes[key] = self._try(first, last, side)
-            statistics.feasible += self._pushes[key] is not None
-            if first == 0 and self._pushes[key] is None:
+            if self._pushes[key] is not None:
+                statistics.feasible += 1
+                self.arrivals += last == len(self.poses) - 1
+            elif first == 0:
                 self._shut[side, last] = True
         return self._pushes[key]
 
@@ -189,7 +194,8 @@ class PushSearch:
     """A search among the poses of a graph; ``run`` yields now and then, and ends with the best.
 
     bound: cost [m] that a solution must stay below. weight: of the guess of what lies before a
-    push, >= 1. expansions: how many pushes may be tried. solution, cost: the best so far.
+    push, >= 1. expansions: how many pushes may be tried. exhausted: whether all pushes
+    that could be part of one have been tried. solution, cost: what was found.
     """
 
     graph: PushGraph
@@ -197,6 +203,7 @@ class PushSearch:
     weight: float
     expansions: int
     expanded: int = 0
+    exhausted: bool = False
     solution: tuple[PushStep, ...] | None = None
     cost: float = math.inf
 
@@ -206,6 +213,7 @@ class PushSearch:
         ready, estimate = graph.rough_costs(self.bound)
         yield
         if not estimate < self.bound:
+            self.exhausted = True
             return
         counter = itertools.count()
         queue = [(estimate, next(counter), _Node(len(graph.poses) - 1, -1, 0.0))]
@@ -252,6 +260,7 @@ class PushSearch:
                 statistics.generated += 1
                 child = _Node(pose, side, cost, node, step)
                 heapq.heappush(queue, (total, next(counter), child))
+        self.exhausted = not queue
 
 
 def _trace(node: _Node) -> tuple[PushStep, ...]:

@@ -67,11 +67,13 @@ def guessed_length(
 def _crosses(field: Any, a: Any, b: Any, least: float, ox: float, oy: float, scale: float) -> bool:
     """Whether the straight line from a to b comes nearer to an obstacle than ``least``."""
     dx, dy = b[0] - a[0], b[1] - a[1]
-    count = int(math.hypot(dx, dy) / _SIGHT_STEP) + 1
-    for k in range(1, count):
-        t = k / count
-        if lookup(field, a[0] + t * dx, a[1] + t * dy, ox, oy, scale) < least:
+    length = math.hypot(dx, dy)
+    way = 0.0
+    while way < length:
+        room = lookup(field, a[0] + dx * way / length, a[1] + dy * way / length, ox, oy, scale)
+        if room < least:
             return True
+        way += max(_SIGHT_STEP, room - least)  # no obstacle can be nearer than that
     return False
 
 

@@ -21,11 +21,11 @@ class PlannerSettings:
     run_lengths: tuple[float, ...] = (0.15, 0.3, 0.6)
     scattered_poses: tuple[int, ...] = (0, 300, 1000)
     heuristic_weight: float = bounded(
-        1.0, low=1.0, high=100.0, doc="of the guessed cost, until there is a plan"
+        3.0, low=1.0, high=100.0, doc="of the guessed cost, where a search with 1 does not end"
     )
-    max_expansions: int = bounded(1500, low=1, high=10000000, doc="pushes tried in one search")
+    max_expansions: int = bounded(1200, low=1, high=10000000, doc="pushes tried in one search")
     total_expansions: int = bounded(
-        4000, low=1, high=10000000, doc="pushes tried until there is a plan"
+        7200, low=1, high=10000000, doc="pushes tried until there is a plan"
     )
     improvement_expansions: int = bounded(
         1500, low=0, high=10000000, doc="pushes tried after the first plan"
@@ -46,7 +46,7 @@ class PlannerSettings:
     move_acceleration: float = bounded(0.15, low=0.005, high=5.0, doc="[m/s^2]")
     turn_rate: float = bounded(1.5, low=0.05, high=10.0, doc="[rad/s] on the spot")
     turn_acceleration: float = bounded(3.0, low=0.05, high=50.0, doc="[rad/s^2]")
-    improvement_rounds: int = bounded(8, low=0, high=50, doc="searches after the first plan")
+    improvement_rounds: int = bounded(12, low=0, high=50, doc="searches after the first plan")
     seed: int = bounded(1, low=1, high=2**31, doc="of the RRT*")
 
     def __post_init__(self) -> None:

@@ -12,7 +12,7 @@ from push_model.settings import SettingsError
 from push_model.specs import BoxSpec, EnvironmentSpec
 from push_planner import PlanError, PlannerSettings, PlanningFailed, PushPlanner
 
-COUNT = 40
+COUNT = 30
 
 
 def attempt(planner, start, goal, seed=None):
