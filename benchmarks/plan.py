@@ -129,17 +129,7 @@ def study(
     """Random problems on one map, and what may be expected of them."""
     outcomes = [attempt(planner, s, g) for s, g in problems(planner, count, seed)]
     solved = [o for o in outcomes if o.costs]
-    missed = []
-    for number, outcome in enumerate(outcomes):
-        if not outcome.costs:
-            cost = exhaustive(planner, outcome.start, outcome.goal, seed)
-            found = "none either" if np.isinf(cost) else f"{cost:.3f} m"
-            print(f"    {name} {number}: {outcome.why}; exhaustive search: {found}", flush=True)
-            if np.isfinite(cost):
-                missed.append(number)
     result: dict[str, Any] = {"seed": seed, "problems": count, "solved": len(solved)}
-    result["missed"] = missed
-    solvable = len(solved) + len(missed)
     if not solved:
         print(f"  {name}: none of {count} problems solved")
         return result, {}
@@ -149,7 +139,6 @@ def study(
     gap = last / np.array([o.bound for o in solved]) - 1.0
     saved = 1.0 - last / np.array([o.costs[0] for o in solved])
     result |= {
-        "solvable": solvable,
         "first_s": {q: float(np.quantile(first, q)) for q in (0.5, 0.95, 1.0)},
         "final_s": {q: float(np.quantile(final, q)) for q in (0.5, 0.99, 1.0)},
         "failure_s": max((o.final for o in outcomes if not o.costs), default=0.0),
@@ -159,14 +148,26 @@ def study(
         "worse": worse,
     }
     print(
-        f"  {name}, seed {seed}: {len(solved)} of {count} solved, {solvable} can be; "
+        f"  {name}, seed {seed}: {len(solved)} of {count} solved; "
         f"first plan median {np.median(first):.3f} s, 95 % {np.quantile(first, 0.95):.3f} s, "
         f"most {first.max():.3f} s; final median {np.median(final):.3f} s, "
         f"99 % {np.quantile(final, 0.99):.3f} s, most {final.max():.3f} s; "
         f"a failure at most {result['failure_s']:.3f} s\n"
         f"  {name}: cost {last.mean():.3f} m on average, {100 * saved.mean():.1f} % less than the "
-        f"first plan's; {100 * np.median(gap):.0f} % (median) above the bound of a straight line"
+        f"first plan's; {100 * np.median(gap):.0f} % (median) above the bound of a straight line",
+        flush=True,
     )
+    missed = []
+    for number, outcome in enumerate(outcomes):
+        if not outcome.costs:
+            cost = exhaustive(planner, outcome.start, outcome.goal, seed)
+            found = "none either" if np.isinf(cost) else f"{cost:.3f} m"
+            print(f"    {name} {number}: {outcome.why}; exhaustive search: {found}", flush=True)
+            if np.isfinite(cost):
+                missed.append(number)
+    solvable = len(solved) + len(missed)
+    result |= {"solvable": solvable, "missed": missed}
+    print(f"  {name}: {solvable} of {count} can be solved", flush=True)
     bounds = {
         f"{name}: solved, of what can be": at_least(len(solved) / solvable, 0.98),
         f"{name}: first plan within 0.5 s": at_least(float((first <= 0.5).mean()), 0.95),

@@ -115,25 +115,20 @@ class PushGraph:
         """
         found = 0
         for side in range(len(self.scene.sides)):
-            for pose in self._worth_leaving_for(side):
+            for pose in range(1, self.window[0, 1]):
                 if found >= enough:
                     return found
-                found += self.push(0, pose, side, statistics) is not None
+                if self.worth_leaving_for(side, pose):
+                    found += self.push(0, pose, side, statistics) is not None
         return found
 
-    def _worth_leaving_for(self, side: int) -> list[int]:
-        """Poses to which a push out of the start on a side need not loop."""
-        if not self.room[side, 0]:
-            return []
+    def worth_leaving_for(self, side: int, pose: int) -> bool:
+        """Whether a push out of the start to the pose has room at both ends and need not loop."""
+        if not (self.room[side, 0] and self.room[side, pose]):
+            return False
+        (ax, ay, _, ac, sa), (bx, by, _, bc, sb) = self.robots[side, 0], self.robots[side, pose]
         left, right = self.diameters[side]
-        x, y, _, c, s = self.robots[side, 0]
-        worth = []
-        for pose in range(1, self.window[0, 1]):
-            bx, by, _, bc, bs = self.robots[side, pose]
-            length = guessed_length(x, y, c, s, bx, by, bc, bs, left, right)
-            if self.room[side, pose] and length < math.inf:
-                worth.append(pose)
-        return worth
+        return bool(guessed_length(ax, ay, ac, sa, bx, by, bc, sb, left, right) < math.inf)
 
     def pushes_into(
         self, pose: int, following: int, cost: float, weight: float, bound: float, ready: Array
@@ -215,6 +210,7 @@ class PushSearch:
         if not estimate < self.bound:
             self.exhausted = True
             return
+        self._try_single_push(statistics)
         counter = itertools.count()
         queue = [(estimate, next(counter), _Node(len(graph.poses) - 1, -1, 0.0))]
         cheapest: dict[tuple[int, int], float] = {}
@@ -261,6 +257,17 @@ class PushSearch:
                 child = _Node(pose, side, cost, node, step)
                 heapq.heappush(queue, (total, next(counter), child))
         self.exhausted = not queue
+
+    def _try_single_push(self, statistics: SearchStatistics) -> None:
+        """One push from start to goal, where there is one, is what others must be better than."""
+        graph = self.graph
+        for side in range(len(graph.scene.sides)):
+            if graph.worth_leaving_for(side, len(graph.poses) - 1):
+                step = graph.push(0, len(graph.poses) - 1, side, statistics)
+                if step is not None:
+                    cost = step.curve.length + graph.scene.settings.push_cost
+                    if cost < self.bound:
+                        self.solution, self.cost, self.bound = (step,), cost, cost
 
 
 def _trace(node: _Node) -> tuple[PushStep, ...]:

@@ -20,7 +20,8 @@ from push_planner.distance_field import lookup
 _NEAREST = 0.03  # [m] of a push
 _WIDEST_COSINE = -0.4161468365471424  # of 2 rad: a push's end seen from its start, and vice versa
 _SIGHT_STEP = 0.02  # [m]
-_DETOUR = 0.6  # [m] guessed for a push whose chord crosses an obstacle
+_THICK = 0.2  # [m] of a chord through an obstacle that no push bends round
+_DETOUR = 0.6  # [m] guessed for such a chord; less for one that only cuts a corner
 
 
 @numba.njit(cache=True)  # infinities: no fast mathematics
@@ -64,17 +65,18 @@ def guessed_length(
 
 
 @numba.njit(cache=True)  # infinities: no fast mathematics
-def _crosses(field: Any, a: Any, b: Any, least: float, ox: float, oy: float, scale: float) -> bool:
-    """Whether the straight line from a to b comes nearer to an obstacle than ``least``."""
+def _crossed(field: Any, a: Any, b: Any, least: float, ox: float, oy: float, scale: float) -> float:
+    """How much of the straight line from a to b is nearer to obstacles than ``least``: a fraction
+    of ``_THICK``, 1 at most."""
     dx, dy = b[0] - a[0], b[1] - a[1]
     length = math.hypot(dx, dy)
-    way = 0.0
-    while way < length:
+    way, crossed = 0.0, 0.0
+    while way < length and crossed < _THICK:
         room = lookup(field, a[0] + dx * way / length, a[1] + dy * way / length, ox, oy, scale)
         if room < least:
-            return True
+            crossed += _SIGHT_STEP
         way += max(_SIGHT_STEP, room - least)  # no obstacle can be nearer than that
-    return False
+    return min(1.0, crossed / _THICK)
 
 
 @numba.njit(cache=True)  # infinities: no fast mathematics
@@ -101,11 +103,9 @@ def _guess(
     if length < math.inf:
         known = sight[i, j - window[i, 0]]
         if known == 0:
-            crosses = _crosses(field, poses[i], poses[j], least, ox, oy, scale)
-            known = 2 if crosses else 1
+            known = 1 + round(100.0 * _crossed(field, poses[i], poses[j], least, ox, oy, scale))
             sight[i, j - window[i, 0]] = known
-        if known == 2:
-            length += _DETOUR
+        length += 0.01 * (known - 1) * _DETOUR
     return float(length)
 
 
