@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
@@ -13,13 +13,17 @@ from push_model.occupancy import OccupancyGrid
 from push_model.push_segment import PushSegment
 from push_model.specs import ObjectSpec, RobotSpec
 from push_model.trajectory import along_curve
+from push_planner.candidate_poses import along_guide, nearby, runs, scattered
 from push_planner.distance_field import DistanceField
 from push_planner.guide_path import GuidePath, NoGuidePath, guide_paths, origin_floor
-from push_planner.push_search import PushSearch, PushStep, SearchStatistics
+from push_planner.push_search import PushGraph, PushSearch, PushStep, SearchStatistics
 from push_planner.scene import PushScene
 from push_planner.settings import PlannerSettings
 
-_WORTH = 0.01  # of the cost that a further plan must save
+_WORTH = 0.002  # of the cost that a further plan must save
+_NEARBY = 40  # poses about each one that an improvement moves
+_WAYPOINTS = 30  # at most, in the first attempt
+_REACH = (10.0, 3.0)  # waypoints that a push leads on at most: of the settings; of a long path
 
 
 class PlanError(IntEnum):
@@ -82,6 +86,38 @@ class Progress:
     best: PushPlan | None
 
 
+class _Work:
+    """What has been spent on one plan, and what is left."""
+
+    def __init__(self, settings: PlannerSettings, seed: int) -> None:
+        self.seed = seed
+        self.random = np.random.default_rng(seed)
+        self.statistics = SearchStatistics()
+        self.iterations = 0
+        self.ways_out = self.ways_in = False  # whether any push leaves the start, ends at the goal
+        self.left = settings.total_expansions
+        self._most = settings.max_expansions
+        self._clock = time.perf_counter()
+
+    def effort(self) -> int:
+        """Pushes that the next search may try."""
+        return min(self.left, self._most)
+
+    def counted(self, guide: GuidePath) -> PlanStatistics:
+        """The work until now."""
+        return PlanStatistics(
+            self.iterations,
+            self.statistics.expanded,
+            self.statistics.generated,
+            self.statistics.solved,
+            self.statistics.feasible,
+            guide.cost,
+            guide.length,
+            guide.clearance,
+            time.perf_counter() - self._clock,
+        )
+
+
 class PushPlanner:
     """Plans pushes of one object by one robot on one map."""
 
@@ -109,81 +145,154 @@ class PushPlanner:
                 occupied, f"at the {what} {where} the object would overlap an obstacle"
             )
 
+    def lower_bound(self, start: Array, goal: Array) -> float:
+        """[m] that no plan can cost less than.
+
+        While the robot drives 1 m the object's centre, ``ahead`` of the axle midpoint, moves
+        sqrt((1 - kappa y)^2 + (kappa ahead)^2) m; no shorter than straight, with one push.
+        """
+        if not self.scene.sides:
+            return np.inf
+        fastest = max(
+            np.hypot(1.0 - kappa * side.grasp[1], kappa * side.grasp[0])
+            for side in self.scene.sides
+            for kappa in (side.trusted.minimum, side.trusted.maximum)
+        )
+        straight = float(np.hypot(*(goal - start)[:2]))
+        return straight / float(max(fastest, 1.0)) + self.settings.push_cost
+
     def plan(self, start: Array, goal: Array, seed: int | None = None) -> Iterator[Progress]:
         """Plan in small slices: each ``next`` does a little work and reports.
 
-        The last report carries the best plan. The work is counted in iterations, never in time, so
-        that equal inputs and seeds give equal plans.
+        The last report carries the best plan, and a plan that is reported never costs more than
+        one before it. The work is counted, never timed, so that equal inputs and seeds give equal
+        plans.
 
         Raises
         ------
         PlanningFailed: when there is no plan; from the ``next`` that finds it out.
         """
-        clock = time.perf_counter()
+        settings = self.settings
+        work = _Work(settings, settings.seed if seed is None else seed)
         start = np.array([start[0], start[1], se2.wrap(start[2])])
         goal = np.array([goal[0], goal[1], se2.wrap(goal[2])])
         self.check(start, "start", PlanError.START_OCCUPIED)
         self.check(goal, "goal", PlanError.GOAL_OCCUPIED)
+        self._check_room(start, "pushed away from the start")
+        self._check_room(goal, "pushed into the goal")
+        guides = []
+        for guide in self._guides(start, goal, work.seed):
+            guides.append(guide)
+            work.iterations += settings.rrt_iterations
+            yield Progress("guide path", None)
+        if not guides:
+            raise PlanningFailed(
+                PlanError.NO_GUIDE_PATH, "no path from start to goal is wide enough for the object"
+            )
+        guides.sort(key=lambda g: g.cost)
         best: PushPlan | None = None
-        any_guide = False
-        iterations = 0
-        totals = SearchStatistics()
-        base = self.settings.seed if seed is None else seed
-        left = self.settings.total_expansions
-        for round_number in range(1 + self.settings.improvement_rounds):
-            if left <= 0:
-                break
-            weight = max(1.0, self.settings.heuristic_weight / 2.0**round_number)
-            guides = []
-            for guide in self._guides(start, goal, base + round_number):
-                guides.append(guide)
-                iterations += self.settings.rrt_iterations
-                yield Progress("guide path", best)
-            any_guide |= bool(guides)
-            guides.sort(key=lambda g: g.cost)
-            for number, guide in enumerate(guides):
-                if left <= 0:
+        for attempt, count in enumerate(settings.scattered_poses):
+            guide = guides[attempt % len(guides)]
+            graph = self._graph(start, goal, guide, attempt, count, work)
+            if not graph.leave(work.statistics, enough=1):
+                continue
+            work.ways_out = True
+            # Greedier when that does not end, and only by ways out of the start that there are;
+            # what has been tried is remembered.
+            for weight in (1.0, settings.heuristic_weight):
+                if weight > 1.0:
+                    graph.leave(work.statistics)
+                search = PushSearch(graph, np.inf, weight, work.effort())
+                for _ in search.run(work.statistics):
+                    yield Progress(f"push search {attempt + 1}", None)
+                work.left -= search.expanded
+                work.ways_in |= graph.arrivals > 0 or search.expanded == 0
+                if search.solution is not None or search.exhausted:
                     break
-                bound = np.inf if best is None else (1.0 - _WORTH) * best.cost
-                if guide.length >= 1.5 * bound:
-                    continue
-                effort = min(left, self.settings.max_expansions)
-                search = PushSearch(self.scene, guide, start, goal, bound, weight, effort)
-                for _ in search.run():
-                    yield Progress(f"push search, round {round_number + 1}.{number + 1}", best)
-                for name in vars(totals):
-                    setattr(totals, name, getattr(totals, name) + getattr(search.statistics, name))
-                left -= search.statistics.expanded
-                if search.solution is not None:
-                    if best is None:
-                        left = self.settings.improvement_expansions
-                    statistics = PlanStatistics(
-                        iterations,
-                        totals.expanded,
-                        totals.generated,
-                        totals.solved,
-                        totals.feasible,
-                        guide.cost,
-                        guide.length,
-                        guide.clearance,
-                        time.perf_counter() - clock,
-                    )
-                    best = self._assemble(search.solution, search.cost, goal, guide, statistics)
-                    yield Progress("improving", best)
-            if not any_guide and round_number == 0:
+            if search.solution is not None:
+                best = self._assemble(search, goal, guide, work)
                 break
         if best is None:
-            if not any_guide:
-                raise PlanningFailed(
-                    PlanError.NO_GUIDE_PATH,
-                    "no path from start to goal is wide enough for the object",
-                )
+            raise PlanningFailed(PlanError.NO_PUSH_SEQUENCE, self._why_not(start, goal, work))
+        yield Progress("improving", best)
+        least = self.lower_bound(start, goal)
+        work.left = settings.improvement_expansions
+        for number in range(settings.improvement_rounds):
+            bound = (1.0 - _WORTH) * best.cost
+            if work.left <= 0 or bound <= least:
+                break
+            if number == 0:
+                graph = self._graph(start, goal, guides[-1], 1, settings.scattered_poses[-1], work)
+            else:
+                between = [s.object_end for s in best.segments[:-1]]
+                if not between:
+                    break
+                size = settings.refinement / 2.0 ** ((number - 1) / 2)
+                poses = nearby(np.array(between), _NEARBY, size, work.random)
+                graph = PushGraph(self.scene, start, goal, poses.free(self.scene), np.inf)
+            search = PushSearch(graph, bound, 1.0, work.effort())
+            for _ in search.run(work.statistics):
+                yield Progress(f"improving, round {number + 1}", best)
+            work.left -= search.expanded
+            if search.solution is not None and search.cost < best.cost:
+                best = self._assemble(search, goal, best.guide, work)
+                yield Progress("improving", best)
+        yield Progress("done", best)
+
+    def _graph(
+        self, start: Array, goal: Array, guide: GuidePath, attempt: int, count: int, work: "_Work"
+    ) -> PushGraph:
+        """Poses along a guide path, at its ends, and ``count`` scattered ones; the first attempt
+        leaves waypoints out where the path is long."""
+        scene = self.scene
+        most = _WAYPOINTS * 2**attempt
+        lengths = self.settings.run_lengths
+        candidates = runs(scene, start, 1.0, 0.0, lengths)
+        candidates += along_guide(scene, guide, start, goal, most)
+        candidates += runs(scene, goal, -1.0, guide.length, lengths)
+        candidates += scattered(scene, guide, count, work.random)
+        spacing = max(self.settings.waypoint_spacing, guide.length / most)
+        reach = max(_REACH[0] * self.settings.waypoint_spacing, _REACH[1] * spacing)
+        return PushGraph(scene, start, goal, candidates.free(scene), reach)
+
+    def _check_room(self, pose: Array, what: str) -> None:
+        """Raise PlanningFailed when the object can be pushed on no side at the pose ``(3,)``."""
+        where = f"({pose[0]:.3f}, {pose[1]:.3f}, {pose[2]:.3f})"
+        needed = self.settings.safety_distance
+        clearance = self.scene.object_clearance(pose)
+        if clearance < needed:
             raise PlanningFailed(
                 PlanError.NO_PUSH_SEQUENCE,
-                f"no sequence of pushes reaches the goal ({totals.expanded} nodes expanded, "
-                f"{totals.feasible} of {totals.solved} pushes feasible)",
+                f"the object cannot be {what} {where}: it is {1e3 * clearance:.1f} mm from an "
+                f"obstacle there, and pushes keep {1e3 * needed:.1f} mm",
             )
-        yield Progress("done", best)
+        sides = self.scene.sides
+        if not sides:
+            raise PlanningFailed(
+                PlanError.NO_PUSH_SEQUENCE,
+                "no side of the object can be pushed: on none is the straight push stable",
+            )
+        contacts = np.array([side.robot_pose(pose) for side in sides])
+        if not self.scene.rooms(contacts).any():
+            raise PlanningFailed(
+                PlanError.NO_PUSH_SEQUENCE,
+                f"no side of the object can be {what} {where}: behind each of its {len(sides)} "
+                f"sides the robot, which needs {1e3 * needed:.1f} mm around it and "
+                f"{1e3 * self.settings.standoff:.0f} mm to back off, would touch an obstacle",
+            )
+
+    def _why_not(self, start: Array, goal: Array, work: "_Work") -> str:
+        """What the searches have found out."""
+        statistics = work.statistics
+        tried = f"{statistics.feasible} of {statistics.solved} pushes tried are free"
+        for found, pose, what in (
+            (work.ways_out, start, "leads away from the start"),
+            (work.ways_in, goal, "ends at the goal"),
+        ):
+            if not found:
+                where = f"({pose[0]:.3f}, {pose[1]:.3f}, {pose[2]:.3f})"
+                return f"no push {what} {where} without a collision; {tried}"
+        return f"no sequence of pushes reaches the goal; {tried}"
 
     def solve(self, start: Array, goal: Array, seed: int | None = None) -> PushPlan:
         """The final plan of ``plan``."""
@@ -242,13 +351,9 @@ class PushPlanner:
         )
 
     def _assemble(
-        self,
-        steps: tuple[PushStep, ...],
-        cost: float,
-        goal: Array,
-        guide: GuidePath,
-        statistics: PlanStatistics,
+        self, search: PushSearch, goal: Array, guide: GuidePath, work: "_Work"
     ) -> PushPlan:
-        segments = tuple(self.segment(step) for step in steps)
+        assert search.solution is not None
+        segments = tuple(self.segment(step) for step in search.solution)
         clearance = min(s.clearance for s in segments)
-        return PushPlan(goal, segments, cost, clearance, guide, replace(statistics))
+        return PushPlan(goal, segments, search.cost, clearance, guide, work.counted(guide))

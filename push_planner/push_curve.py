@@ -18,6 +18,7 @@ from push_model.arrays import Array
 _COARSE, _DENSE = 41, 321
 _GRID = 10
 _STARTS = 3
+_ROUNDS = 100  # of a compass search; few need 40, but one can creep to k = infinity
 _SHORTEST = 0.02  # [m] least k_i, k_f; (2.6)
 
 
@@ -81,7 +82,9 @@ def _refine(
     basis: Any,
 ) -> tuple[float, float, float]:
     """Compass search for the shortest feasible curve, in log(k)."""
-    while step > 1e-3:
+    for _ in range(_ROUNDS):
+        if step <= 1e-3:
+            break
         found = False
         for k in range(12):
             a = k * 0.5235987755982988
@@ -111,7 +114,9 @@ def _reduce_violation(
     basis: Any,
 ) -> tuple[float, float, float]:
     """Compass search for a feasible curve; ends as soon as there is one."""
-    while step > 1e-3 and worst > 0.0:
+    for _ in range(_ROUNDS):
+        if step <= 1e-3 or worst <= 0.0:
+            break
         found = False
         for k in range(12):
             a = k * 0.5235987755982988

@@ -1,36 +1,32 @@
 """Layer 2: A* over object poses and pushing sides, Algorithms 1 and 2.
 
-The search runs backward from the goal, as in the thesis. A node is an object pose on Gamma and the
-side on which the push that starts there pushes; its parent is nearer to the goal.
+The search runs backward from the goal, as in the thesis. A node is an object pose and the side on
+which the push that starts there pushes; its parent is nearer to the goal.
 
-Algorithm 2 tries pushes from the farthest waypoint on and stops after a few that have any. That
-loses plans: where the far ones lead nowhere, the near ones are never tried. Here a node is expanded
-one waypoint at a time (partial expansion A*): it goes back into the queue with the least cost that
-its next waypoint can have. No push is lost, and far ones are still tried first. The distance to
-the start is weighted, so that a first plan is found early; later searches are less greedy, and drop
-what cannot be shorter than the best plan so far. A node is settled by its first expansion, as in
-any weighted A*: plans are good, not optimal.
+Algorithm 2 makes every push into a node before it looks at the next one, and stops after the
+farthest few. Here no push is lost, and few are made: all pushes into a node are guessed
+(rough_cost.py), and only the one that looks best in the whole queue is solved and swept (lazy
+weighted A*). What has been found out about a push is kept for all nodes that it could lead to.
 """
 
 import heapq
 import itertools
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from push_model import se2
 from push_model.arrays import Array
-from push_model.stable_push import CurvatureLimits
-from push_planner.guide_path import GuidePath, waypoints
+from push_planner.candidate_poses import Candidates
 from push_planner.push_curve import PushCurve, shortest_push_curve
+from push_planner.rough_cost import guessed_length, pushes_into, rough_costs
 from push_planner.scene import PushScene, PushSide
-from push_planner.settings import PlannerSettings
 
-_NEAREST = 0.03  # [m] of a push
-_WIDEST_BEARING = 2.0  # [rad] of a push's end seen from its start, and the other way round
+_SLICE = 20  # pushes tried between two reports
 
 
 @dataclass
@@ -41,17 +37,6 @@ class SearchStatistics:
     generated: int = 0
     solved: int = 0
     feasible: int = 0
-
-
-@dataclass
-class _Node:
-    pose: Array
-    place: tuple[int, int]  # waypoint, orientation
-    side: PushSide | None
-    cost: float  # g of (2.10)
-    clearance: float
-    parent: "_Node | None" = None
-    curve: PushCurve | None = None
 
 
 @dataclass(frozen=True)
@@ -66,172 +51,129 @@ class PushStep:
 
 
 @dataclass
-class PushSearch:
-    """A search along one guide path. ``run`` yields after each partial expansion.
+class _Node:
+    pose: int
+    side: int  # on which the push that starts here pushes; -1 at the goal
+    cost: float  # g of (2.10)
+    parent: "_Node | None" = None
+    step: PushStep | None = None
+    estimates: Array | None = None  # of the pushes that end here
+    states: NDArray[np.int64] | None = None
+    tried: int = 0
 
-    bound: cost [m] that a solution must stay below. weight: of the heuristic, >= 1. expansions:
-    how many there may be.
-    """
 
-    scene: PushScene
-    guide: GuidePath
-    start: Array
-    goal: Array
-    bound: float
-    weight: float
-    expansions: int
-    statistics: SearchStatistics = field(default_factory=SearchStatistics)
-    solution: tuple[PushStep, ...] | None = None
-    cost: float = math.inf
-    _room: dict[bytes, bool] = field(default_factory=dict)
+class PushGraph:
+    """Object poses, what pushes between them would cost, and those pushes that have been tried."""
 
-    def run(self) -> Iterator[None]:
-        """Algorithm 1."""
-        settings = self.scene.settings
-        points, headings, way = waypoints(self.guide, settings.waypoint_spacing)
-        poses = self._poses(points, headings, settings)
-        starts = [self._robot_poses(p) for p in poses]
-        last = len(poses) - 1
-        root = _Node(self.goal, (last, -1), None, 0.0, math.inf)
-        counter = itertools.count()
-        direct = [self._distances(p) for p in poses]  # never more than what is left, to prune with
-        # h of (2.11); for the straight runs off Gamma, the distance to the start
-        rest = [
-            direct[0],
-            direct[1],
-            *(np.full(len(p), w) for p, w in zip(poses[2:-2], way[1:-1], strict=True)),
-            direct[-2],
-            np.full(1, way[-1]),
-        ]
-        # estimate, tie-break, node, waypoint to push from next
-        queue = [(float(way[-1]), next(counter), root, 0)]
-        settled: set[tuple[int, int, int]] = set()
-        while queue and self.statistics.expanded < self.expansions:
-            estimate, _, node, waypoint = heapq.heappop(queue)
-            if waypoint == 0:
-                key = (*node.place, -1 if node.side is None else node.side.index)
-                if key in settled:
-                    continue
-                settled.add(key)
-                if node.place[0] == 0:
-                    self.solution, self.cost = self._trace(node), node.cost
-                    return
-            self.statistics.expanded += 1
-            for child in self._successors(
-                node, poses[waypoint], starts[waypoint], direct[waypoint], waypoint
-            ):
-                self.statistics.generated += 1
-                key = (*child.place, child.side.index if child.side else -1)
-                h = float(rest[waypoint][child.place[1]])
-                if key not in settled:
-                    f = child.cost + self.weight * h
-                    heapq.heappush(queue, (f, next(counter), child, 0))
-            for following in range(waypoint + 1, node.place[0]):
-                if not poses[following]:
-                    continue
-                gap = np.hypot(*(np.array(poses[following])[:, :2] - node.pose[:2]).T)
-                if node.cost + float((gap + direct[following]).min()) < self.bound:
-                    least = node.cost + float((gap + self.weight * rest[following]).min())
-                    entry = (max(estimate, least), next(counter), node, following)
-                    heapq.heappush(queue, entry)
-                    break
-            yield
-
-    def _distances(self, poses: list[Array]) -> Array:
-        way: Array = np.hypot(*(np.array(poses).reshape(-1, 3) - self.start)[:, :2].T)
-        return way
-
-    def _runs(self, pose: Array, sign: float) -> list[Array]:
-        """Object poses a straight push before (sign -1) or after (+1) a pose, on every side.
-
-        Off Gamma, but through them most pushes leave the start and reach the goal: curves are wide,
-        and the first and last heading are given.
-        """
-        settings = self.scene.settings
-        result = []
-        for side in self.scene.sides:
-            heading = float(pose[2]) - side.contact.heading
-            for length in settings.run_lengths:
-                place = pose + sign * length * np.array([math.cos(heading), math.sin(heading), 0.0])
-                if self.scene.object_clearance(place) >= settings.safety_distance:
-                    result.append(place)
-        return result
-
-    def _poses(
-        self, points: Array, headings: Array, settings: PlannerSettings
-    ) -> list[list[Array]]:
-        """Object poses at each waypoint: one of its sides faces along Gamma, or nearly so."""
-        result = [[self.start]]
-        for point, heading in zip(points[1:-1], headings[1:-1], strict=True):
-            angles: list[float] = [self.start[2], self.goal[2]]
-            for offset in settings.heading_offsets:
-                for side in self.scene.sides:
-                    angles.append(se2.wrap(heading + offset + side.contact.heading))
-            distinct: list[float] = []
-            for angle in angles:
-                if all(abs(se2.wrap(angle - other)) > 0.05 for other in distinct):
-                    distinct.append(angle)
-            aside = np.array([-math.sin(heading), math.cos(heading)])
-            places = [point + offset * aside for offset in settings.lateral_offsets]
-            candidates = [np.array([x, y, angle]) for x, y in places for angle in distinct]
-            least = settings.safety_distance
-            result.append([p for p in candidates if self.scene.object_clearance(p) >= least])
-        before, after = self._runs(self.start, 1.0), self._runs(self.goal, -1.0)
-        return [result[0], before, *result[1:], after, [self.goal]]
-
-    def _robot_poses(self, poses: list[Array]) -> list[Array]:
-        """For each side, the robot ``(n, 3)`` in contact with the object at the poses."""
-        table = np.array(poses).reshape(-1, 3)
-        c, s = np.cos(table[:, 2]), np.sin(table[:, 2])
-        result = []
-        for side in self.scene.sides:
+    def __init__(
+        self, scene: PushScene, start: Array, goal: Array, candidates: Candidates, reach: float
+    ) -> None:
+        self.scene = scene
+        order = np.argsort(candidates.way, kind="stable")
+        self.poses = np.vstack([start, candidates.poses[order], goal])
+        first, last = (candidates.way.min(), candidates.way.max()) if len(order) else (0.0, 0.0)
+        way = np.concatenate([[first], candidates.way[order], [last]])
+        self.window = np.column_stack(
+            [
+                np.searchsorted(way, way - reach, side="left"),
+                np.searchsorted(way, way + reach, side="right"),
+            ]
+        )
+        c, s = np.cos(self.poses[:, 2]), np.sin(self.poses[:, 2])
+        robots = []
+        for side in scene.sides:
             x, y, theta = se2.inverse(side.grasp)
-            position = table[:, :2] + np.column_stack([c * x - s * y, s * x + c * y])
-            result.append(np.column_stack([position, table[:, 2] + theta]))
-        return result
+            heading = self.poses[:, 2] + theta
+            position = self.poses[:, :2] + np.column_stack([c * x - s * y, s * x + c * y])
+            robots.append(np.column_stack([position, heading, np.cos(heading), np.sin(heading)]))
+        self.robots = np.array(robots)
+        self.room = np.array([scene.rooms(np.ascontiguousarray(r[:, :3])) for r in robots])
+        self.diameters = np.array(
+            [[2.0 / s.trusted.maximum, -2.0 / s.trusted.minimum] for s in scene.sides]
+        )
+        settings = scene.settings
+        self._shut = np.zeros(self.room.shape, dtype=np.bool_)
+        widest = int((self.window[:, 1] - self.window[:, 0]).max())
+        sight = np.zeros((len(self.poses), widest), dtype=np.int8)
+        self._costs = (settings.push_cost, settings.side_change_cost)
+        least = scene.shape.inradius + settings.safety_distance
+        self._view = (self._shut, self.window, sight, least, scene.field.values, *scene.field.args)
+        self.arrivals = 0  # pushes found that end at the goal
+        self._pushes: dict[tuple[int, int, int], PushStep | None] = {}
 
-    def _successors(
-        self,
-        node: _Node,
-        poses: list[Array],
-        starts: list[Array],
-        remaining: Array,
-        waypoint: int,
-    ) -> Iterator[_Node]:
-        """Pushes from the poses at one waypoint that end at the node, as far as they can be part of
-        a solution below the bound; remaining: of each pose, the distance to the start."""
-        for side, robots in zip(self.scene.sides, starts, strict=True):
-            end = side.robot_pose(node.pose)
-            way = np.hypot(*(robots[:, :2] - end[:2]).T)
-            promising = np.flatnonzero(
-                worth_trying(robots, end, side.trusted) & (node.cost + way + remaining < self.bound)
-            )
-            if len(promising) == 0 or not self._has_room(end):
-                continue
-            for number in promising.tolist():
-                start = robots[number]
-                if self._has_room(start):
-                    place = (waypoint, number)
-                    child = self._push(poses[number], place, start, end, side, node)
-                    if child is not None:
-                        yield child
+    def rough_costs(self, bound: float) -> tuple[Array, float]:
+        """Guessed cost [m] to come to each state ``(n, sides)``, and that of a plan."""
+        ready, arrived = rough_costs(
+            self.poses, self.robots, self.room, self.diameters, *self._costs, bound, *self._view
+        )
+        return ready, float(arrived[-1].min())
 
-    def _has_room(self, robot: Array) -> bool:
-        key = robot.tobytes()
-        if key not in self._room:
-            self._room[key] = self.scene.has_room(robot)
-        return self._room[key]
+    def leave(self, statistics: SearchStatistics, enough: float = math.inf) -> int:
+        """Try pushes out of the start, until ``enough`` are found; how many are.
 
-    def _push(
-        self,
-        pose: Array,
-        place: tuple[int, int],
-        start: Array,
-        end: Array,
-        side: PushSide,
-        node: _Node,
-    ) -> _Node | None:
-        self.statistics.solved += 1
+        Guesses leave out from now on those that cannot be made.
+        """
+        found = 0
+        for side in range(len(self.scene.sides)):
+            for pose in range(1, self.window[0, 1]):
+                if found >= enough:
+                    return found
+                if self.worth_leaving_for(side, pose):
+                    found += self.push(0, pose, side, statistics) is not None
+        return found
+
+    def worth_leaving_for(self, side: int, pose: int) -> bool:
+        """Whether a push out of the start to the pose has room at both ends and need not loop."""
+        if not (self.room[side, 0] and self.room[side, pose]):
+            return False
+        (ax, ay, _, ac, sa), (bx, by, _, bc, sb) = self.robots[side, 0], self.robots[side, pose]
+        left, right = self.diameters[side]
+        return bool(guessed_length(ax, ay, ac, sa, bx, by, bc, sb, left, right) < math.inf)
+
+    def pushes_into(
+        self, pose: int, following: int, cost: float, weight: float, bound: float, ready: Array
+    ) -> Any:
+        """Estimates of plans through a push that ends at the pose, and where it starts."""
+        return pushes_into(
+            pose,
+            following,
+            cost,
+            weight,
+            self.poses,
+            self.robots,
+            self.room,
+            self.diameters,
+            *self._costs,
+            bound,
+            *self._view,
+            ready,
+        )
+
+    def side_change(self, pose: int, before: int, after: int) -> float:
+        """[m] cost of pushing on another side than the push that ended at the pose."""
+        if after < 0 or before == after:
+            return 0.0
+        way = self.robots[before, pose, :2] - self.robots[after, pose, :2]
+        return float(np.hypot(*way)) + self.scene.settings.side_change_cost
+
+    def push(
+        self, first: int, last: int, side: int, statistics: SearchStatistics
+    ) -> PushStep | None:
+        """The push on a side from pose to pose, or None where there is none that is free."""
+        key = (first, last, side)
+        if key not in self._pushes:
+            statistics.solved += 1
+            self._pushes[key] = self._try(first, last, side)
+            if self._pushes[key] is not None:
+                statistics.feasible += 1
+                self.arrivals += last == len(self.poses) - 1
+            elif first == 0:
+                self._shut[side, last] = True
+        return self._pushes[key]
+
+    def _try(self, first: int, last: int, number: int) -> PushStep | None:
+        side = self.scene.sides[number]
+        start, end = self.robots[number, first, :3], self.robots[number, last, :3]
         curve = shortest_push_curve(start, end, side.trusted.minimum, side.trusted.maximum)
         if curve is None:
             return None
@@ -239,35 +181,99 @@ class PushSearch:
         clearance = self.scene.curve_clearance(curve, side, needed)
         if clearance < needed:
             return None
-        self.statistics.feasible += 1
-        cost = node.cost + curve.length + self.scene.settings.push_cost
-        if node.side is not None and node.side.index != side.index:
-            other = node.side.robot_pose(node.pose)
-            cost += float(np.hypot(*(other - end)[:2])) + self.scene.settings.side_change_cost
-        return _Node(pose, place, side, cost, clearance, node, curve)
-
-    def _trace(self, node: _Node) -> tuple[PushStep, ...]:
-        steps = []
-        while node.parent is not None:
-            assert node.side is not None and node.curve is not None
-            steps.append(
-                PushStep(node.side, node.curve, node.pose, node.parent.pose, node.clearance)
-            )
-            node = node.parent
-        return tuple(steps)
+        return PushStep(side, curve, self.poses[first], self.poses[last], clearance)
 
 
-def worth_trying(starts: Array, end: Array, limits: CurvatureLimits) -> NDArray[np.bool_]:
-    """Whether a push that does not loop could lead from starts ``(n, 3)`` to end ``(3,)``.
+@dataclass
+class PushSearch:
+    """A search among the poses of a graph; ``run`` yields now and then, and ends with the best.
 
-    Either pose must lie outside the tightest circle that the other one touches on that side.
+    bound: cost [m] that a solution must stay below. weight: of the guess of what lies before a
+    push, >= 1. expansions: how many pushes may be tried. exhausted: whether all pushes
+    that could be part of one have been tried. solution, cost: what was found.
     """
-    dx, dy = end[0] - starts[:, 0], end[1] - starts[:, 1]
-    distance, bearing = np.hypot(dx, dy), np.arctan2(dy, dx)
-    worth: NDArray[np.bool_] = distance >= _NEAREST
-    for angle in (bearing - starts[:, 2], end[2] - bearing):
-        angle = (angle + math.pi) % (2.0 * math.pi) - math.pi
-        diameter = np.where(angle > 0.0, 2.0 / limits.maximum, -2.0 / limits.minimum)
-        worth &= np.abs(angle) <= _WIDEST_BEARING
-        worth &= distance >= diameter * np.sin(np.minimum(np.abs(angle), 0.5 * math.pi))
-    return worth
+
+    graph: PushGraph
+    bound: float
+    weight: float
+    expansions: int
+    expanded: int = 0
+    exhausted: bool = False
+    solution: tuple[PushStep, ...] | None = None
+    cost: float = math.inf
+
+    def run(self, statistics: SearchStatistics) -> Iterator[None]:
+        """Algorithm 1; adds to the statistics."""
+        graph = self.graph
+        ready, estimate = graph.rough_costs(self.bound)
+        yield
+        if not estimate < self.bound:
+            self.exhausted = True
+            return
+        self._try_single_push(statistics)
+        counter = itertools.count()
+        queue = [(estimate, next(counter), _Node(len(graph.poses) - 1, -1, 0.0))]
+        cheapest: dict[tuple[int, int], float] = {}
+        settled: set[tuple[int, int]] = set()
+        while queue and self.expanded < self.expansions:
+            _, _, node = heapq.heappop(queue)
+            key = (node.pose, node.side)
+            if node.states is None:
+                if key in settled:
+                    continue
+                settled.add(key)
+                if node.pose == 0:
+                    self.solution, self.cost = _trace(node), node.cost
+                    return
+                node.estimates, node.states = graph.pushes_into(
+                    node.pose, node.side, node.cost, self.weight, self.bound, ready
+                )
+            assert node.estimates is not None
+            if node.tried >= len(node.states):
+                continue
+            state = int(node.states[node.tried])
+            estimate = float(node.estimates[node.tried])
+            node.tried += 1
+            if node.tried < len(node.states):
+                again = (float(node.estimates[node.tried]), next(counter), node)
+                heapq.heappush(queue, again)
+            pose, side = divmod(state, len(graph.scene.sides))
+            if (pose, side) in settled:
+                continue
+            self.expanded += 1
+            statistics.expanded += 1
+            step = graph.push(pose, node.pose, side, statistics)
+            if self.expanded % _SLICE == 0:
+                yield
+            if step is None:
+                continue
+            cost = node.cost + step.curve.length + graph.scene.settings.push_cost
+            cost += graph.side_change(node.pose, side, node.side)
+            total = cost + self.weight * float(ready[pose, side])
+            plain = cost + float(ready[pose, side])
+            if plain < self.bound and cost < cheapest.get((pose, side), math.inf):
+                cheapest[pose, side] = cost
+                statistics.generated += 1
+                child = _Node(pose, side, cost, node, step)
+                heapq.heappush(queue, (total, next(counter), child))
+        self.exhausted = not queue
+
+    def _try_single_push(self, statistics: SearchStatistics) -> None:
+        """One push from start to goal, where there is one, is what others must be better than."""
+        graph = self.graph
+        for side in range(len(graph.scene.sides)):
+            if graph.worth_leaving_for(side, len(graph.poses) - 1):
+                step = graph.push(0, len(graph.poses) - 1, side, statistics)
+                if step is not None:
+                    cost = step.curve.length + graph.scene.settings.push_cost
+                    if cost < self.bound:
+                        self.solution, self.cost, self.bound = (step,), cost, cost
+
+
+def _trace(node: _Node) -> tuple[PushStep, ...]:
+    steps = []
+    while node.parent is not None:
+        assert node.step is not None
+        steps.append(node.step)
+        node = node.parent
+    return tuple(steps)

@@ -1,10 +1,12 @@
 """Robot, object and map together: what fits where, and what a push sweeps."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 from push_model import se2
 from push_model.arrays import Array
@@ -22,37 +24,112 @@ from push_planner.settings import PlannerSettings
 
 _OUTLINE_SPACING = 0.01  # [m]
 _SWEEP_SPACING = 0.01  # [m]
+_COARSEST = 16  # samples of a sweep from one of the first to the next
 
 
 @numba.njit(cache=True, fastmath=True)
-def _sweep(
+def push_clearance(
+    start: Any,
+    end: Any,
+    k_start: float,
+    k_end: float,
+    count: int,
+    needed: float,
+    offset: Any,
     field: Any,
-    robots: Any,
     robot_points: Any,
     object_points: Any,
+    robot_radius: float,
     object_radius: float,
-    offset: Any,
-    needed: float,
     ox: float,
     oy: float,
     scale: float,
 ) -> float:
-    """Least clearance of robot and object over robot poses (n, 3); stops below ``needed``."""
+    """Least clearance of robot and object on ``count`` poses of a push curve.
+
+    Coarse samples come first, then those between them: a push that collides is found out early.
+    Stops below ``needed``.
+    """
+    x0, y0, theta = start[0], start[1], start[2]
+    dx, dy = end[0] - x0, end[1] - y0
+    ct, st = math.cos(theta), math.sin(theta)
+    x, y = ct * dx + st * dy, -st * dx + ct * dy
+    turn = end[2] - theta
+    c, s = k_end * math.cos(turn), k_end * math.sin(turn)
+    cell = 1.0 / scale  # interpolated distances can fall faster than the way does
     least = 1e9
+    stride = _COARSEST
+    first = 0
+    while stride >= 1:
+        for k in range(first, count, _COARSEST if first == 0 else 2 * stride):
+            t = k / (count - 1)
+            h, hi, hf = t * t * (3.0 - 2.0 * t), t * (t - 1.0) ** 2, t * t * (t - 1.0)
+            d, di, df = 6.0 * t * (1.0 - t), (t - 1.0) * (3.0 * t - 1.0), t * (3.0 * t - 2.0)
+            u, v = h * x + hi * k_start + hf * c, h * y + hf * s
+            heading = theta + math.atan2(d * y + df * s, d * x + di * k_start + df * c)
+            px, py = x0 + ct * u - st * v, y0 + st * u + ct * v
+            if lookup(field, px, py, ox, oy, scale) - robot_radius - cell < least:
+                e = points_clearance(field, robot_points, px, py, heading, ox, oy, scale)
+                least = min(least, e)
+            ch, sh = math.cos(heading), math.sin(heading)
+            qx = px + ch * offset[0] - sh * offset[1]
+            qy = py + sh * offset[0] + ch * offset[1]
+            if lookup(field, qx, qy, ox, oy, scale) - object_radius - cell < least:
+                turned = heading + offset[2]
+                e = points_clearance(field, object_points, qx, qy, turned, ox, oy, scale)
+                least = min(least, e)
+            if least < needed:
+                return float(least)
+        stride //= 2
+        first = stride
+    return float(least)
+
+
+@numba.njit(cache=True, fastmath=True)
+def _rooms(
+    robots: Any,
+    back: Any,
+    turning: float,
+    needed: float,
+    field: Any,
+    robot_points: Any,
+    ox: float,
+    oy: float,
+    scale: float,
+) -> Any:
+    """Whether the robot at contact poses (n, 3) can back off by ``back`` (m,) and turn there."""
+    result = np.zeros(robots.shape[0], dtype=np.bool_)
     for i in range(robots.shape[0]):
         x, y, theta = robots[i, 0], robots[i, 1], robots[i, 2]
-        d = points_clearance(field, robot_points, x, y, theta, ox, oy, scale)
-        c, s = np.cos(theta), np.sin(theta)
-        px = x + c * offset[0] - s * offset[1]
-        py = y + s * offset[0] + c * offset[1]
-        rough = lookup(field, px, py, ox, oy, scale) - object_radius
-        if rough < min(d, least):
-            e = points_clearance(field, object_points, px, py, theta + offset[2], ox, oy, scale)
-            d = min(d, e)
-        least = min(least, d)
-        if least < needed:
-            return float(least)
-    return float(least)
+        c, s = math.cos(theta), math.sin(theta)
+        far = back[-1]
+        if lookup(field, x - far * c, y - far * s, ox, oy, scale) < turning:
+            continue
+        good = True
+        for b in back:
+            d = points_clearance(field, robot_points, x - b * c, y - b * s, theta, ox, oy, scale)
+            if d < needed:
+                good = False
+                break
+        result[i] = good
+    return result
+
+
+@numba.njit(cache=True, fastmath=True)
+def _clearances(field: Any, poses: Any, points: Any, ox: float, oy: float, scale: float) -> Any:
+    """Least clearance of an outline at each of the poses (n, 3); 0 with its origin in a wall."""
+    result = np.zeros(poses.shape[0])
+    for i in range(poses.shape[0]):
+        x, y = poses[i, 0], poses[i, 1]
+        if lookup(field, x, y, ox, oy, scale) > 0.0:
+            result[i] = points_clearance(field, points, x, y, poses[i, 2], ox, oy, scale)
+    return result
+
+
+@numba.njit(cache=True)
+def sweep_count(length: float) -> int:
+    """Samples of the sweep of a push so long [m]."""
+    return max(8, int(length / _SWEEP_SPACING) + 2)
 
 
 @dataclass(frozen=True)
@@ -108,6 +185,7 @@ class PushScene:
         self.sides = push_sides(robot, item, settings.friction_trust)
         self._object_points = self.shape.dense_outline(_OUTLINE_SPACING)
         self._robot_points = densified(robot.outline, _OUTLINE_SPACING)
+        self._robot_radius = float(np.hypot(*robot.outline.T).max())
 
     def object_clearance(self, pose: Array) -> float:
         """[m] of the object at a pose ``(3,)``; 0 when it overlaps an obstacle."""
@@ -119,37 +197,55 @@ class PushScene:
         """[m] of the robot at a pose ``(3,)``."""
         return self.field.clearance(self._robot_points, pose)
 
-    def sweep_clearance(self, robots: Array, side: PushSide, needed: float = 0.0) -> float:
-        """[m] least clearance of robot and object over robot poses ``(n, 3)``."""
-        return float(
-            _sweep(
-                self.field.values,
-                robots,
-                self._robot_points,
-                self._object_points,
-                self.shape.circumradius,
-                side.grasp,
-                needed,
-                *self.field.args,
-            )
+    def object_clearances(self, poses: Array) -> Array:
+        """[m] ``(n,)`` of the object at poses ``(n, 3)``; 0 where its centre is in a wall."""
+        values: Array = _clearances(self.field.values, poses, self._object_points, *self.field.args)
+        return values
+
+    @property
+    def sweep_arguments(self) -> tuple[Any, ...]:
+        """What ``push_clearance`` takes after the grasp."""
+        return (
+            self.field.values,
+            self._robot_points,
+            self._object_points,
+            self._robot_radius,
+            self.shape.circumradius,
+            *self.field.args,
         )
 
     def curve_clearance(self, curve: PushCurve, side: PushSide, needed: float) -> float:
-        """[m] least clearance of a push along a curve."""
-        count = max(8, int(curve.length / _SWEEP_SPACING) + 2)
-        points, heading, _ = curve.sample(count)
-        return self.sweep_clearance(np.column_stack([points, heading]), side, needed)
+        """[m] least clearance of a push along a curve; stops below ``needed``."""
+        return float(
+            push_clearance(
+                curve.start,
+                curve.end,
+                curve.k_start,
+                curve.k_end,
+                sweep_count(curve.length),
+                needed,
+                side.grasp,
+                *self.sweep_arguments,
+            )
+        )
 
     def standoff(self, contact_pose: Array) -> Array:
         """Robot pose ``(3,)`` behind a contact pose, where an approach begins."""
         return se2.compose(contact_pose, np.array([-self.settings.standoff, 0.0, 0.0]))
 
+    def rooms(self, contact_poses: Array) -> NDArray[np.bool_]:
+        """Whether the robot can back off from (and so come to) contact poses ``(n, 3)``."""
+        result: NDArray[np.bool_] = _rooms(
+            contact_poses,
+            np.linspace(0.0, self.settings.standoff, 4),
+            self.robot.footprint_radius,
+            self.settings.safety_distance,
+            self.field.values,
+            self._robot_points,
+            *self.field.args,
+        )
+        return result
+
     def has_room(self, contact_pose: Array) -> bool:
-        """Whether the robot can back off from (and so come to) a contact pose ``(3,)``."""
-        for back in np.linspace(0.0, self.settings.standoff, 4):
-            pose = se2.compose(contact_pose, np.array([-back, 0.0, 0.0]))
-            if self.robot_clearance(pose) < self.settings.safety_distance:
-                return False
-        standoff = self.standoff(contact_pose)
-        turning = self.field.at(standoff[0], standoff[1]) - self.robot.footprint_radius
-        return turning >= 0.0
+        """``rooms`` of one contact pose ``(3,)``."""
+        return bool(self.rooms(contact_pose[None])[0])

@@ -1,5 +1,7 @@
 """Settings of the two-layer push planner."""
 
+import math
+
 from push_model.settings import SettingsError, bounded, settings
 
 
@@ -16,17 +18,19 @@ class PlannerSettings:
     heading_offsets: tuple[float, ...] = (0.0, 0.5, -0.5, 1.0, -1.0)
     lateral_offsets: tuple[float, ...] = (0.0, 0.25, -0.25, 0.5, -0.5)
     run_lengths: tuple[float, ...] = (0.15, 0.3, 0.6)
+    scattered_poses: tuple[int, ...] = (0, 300, 1000)
     heuristic_weight: float = bounded(
-        4.0, low=1.0, high=100.0, doc="of the first search; halved in each further round"
+        3.0, low=1.0, high=100.0, doc="of the guessed cost, where a search with 1 does not end"
     )
-    max_expansions: int = bounded(
-        400, low=1, high=100000, doc="of A* along one guide path, by one waypoint each"
-    )
+    max_expansions: int = bounded(1200, low=1, high=10000000, doc="pushes tried in one search")
     total_expansions: int = bounded(
-        1000, low=1, high=1000000, doc="of all searches until there is a plan"
+        7200, low=1, high=10000000, doc="pushes tried until there is a plan"
     )
     improvement_expansions: int = bounded(
-        200, low=0, high=1000000, doc="of all searches after the first plan"
+        1500, low=0, high=10000000, doc="pushes tried after the first plan"
+    )
+    refinement: float = bounded(
+        0.1, low=0.001, high=2.0, doc="[m] by which an improvement moves poses, halved every two"
     )
     push_cost: float = bounded(0.05, low=0.0, high=10.0, doc="[m] added for the stop of each push")
     side_change_cost: float = bounded(0.3, low=0.0, high=10.0, doc="[m] added for a change of side")
@@ -41,9 +45,7 @@ class PlannerSettings:
     move_acceleration: float = bounded(0.15, low=0.005, high=5.0, doc="[m/s^2]")
     turn_rate: float = bounded(1.5, low=0.05, high=10.0, doc="[rad/s] on the spot")
     turn_acceleration: float = bounded(3.0, low=0.05, high=50.0, doc="[rad/s^2]")
-    improvement_rounds: int = bounded(
-        2, low=0, high=50, doc="further guide paths searched after the first plan"
-    )
+    improvement_rounds: int = bounded(12, low=0, high=50, doc="searches after the first plan")
     max_preemptive: int = bounded(
         8, low=0, high=100, doc="pre-emptive pushes from whose ends a plan is looked for"
     )
@@ -54,3 +56,18 @@ class PlannerSettings:
             raise SettingsError("length_weight and clearance_weight must not both be 0")
         if not self.heading_offsets or not self.lateral_offsets:
             raise SettingsError("heading_offsets and lateral_offsets need at least one value")
+        if not self.scattered_poses or min(self.scattered_poses) < 0:
+            raise SettingsError(
+                "scattered_poses: expected counts, one for each search until there is a plan, "
+                f"got {list(self.scattered_poses)}"
+            )
+        for length in self.run_lengths:
+            if not 0.0 < length < math.inf:
+                raise SettingsError(
+                    f"run_lengths: expected lengths above 0 m, got {list(self.run_lengths)}"
+                )
+        for name in ("heading_offsets", "lateral_offsets"):
+            if not all(map(math.isfinite, getattr(self, name))):
+                raise SettingsError(
+                    f"{name}: expected finite values, got {list(getattr(self, name))}"
+                )

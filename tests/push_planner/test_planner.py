@@ -18,7 +18,7 @@ from push_planner import (
     shortest_push_curve,
 )
 from push_planner.guide_path import guide_paths, path_cost, shortest_path
-from push_planner.push_search import worth_trying
+from push_planner.rough_cost import guessed_length
 from push_scenario.scenario import load_scenario, scenario_names
 
 START, GOAL = np.array([-1.15, -0.7, 0.0]), np.array([1.3, 0.75, 0.0])
@@ -106,8 +106,8 @@ def test_a_waypoint_that_leads_nowhere_hides_no_other(planner):
     """Environment 1, second target: the pushes that end there from far off need a box that lies
     turned; Algorithm 2, which looks no further, ends without a plan."""
     plan = planner.solve(START, np.array([1.3, 0.75, np.pi / 2]))
-    assert len(plan.segments) >= 2 and len({s.side for s in plan.segments}) >= 2
-    assert plan.statistics.nodes_expanded > 20
+    assert len(plan.segments) >= 2
+    assert plan.statistics.curves_solved > plan.statistics.curves_feasible > len(plan.segments)
 
 
 def test_a_waypoint_without_a_pose_ends_no_search(scenario, robot, box):
@@ -125,7 +125,17 @@ def test_bearings_rule_out_only_pushes_that_must_loop():
     for _ in range(400):
         start = np.array([0.0, 0.0, random.uniform(-1.5, 1.5)])
         end = np.array([random.uniform(0.1, 1.5), 0.0, random.uniform(-1.5, 1.5)])
-        if not worth_trying(start[None], end, limits)[0]:
+        guess = guessed_length(
+            *start[:2],
+            np.cos(start[2]),
+            np.sin(start[2]),
+            *end[:2],
+            np.cos(end[2]),
+            np.sin(end[2]),
+            2.0 / limits.maximum,
+            -2.0 / limits.minimum,
+        )
+        if not np.isfinite(guess):
             ruled_out += 1
             curve = shortest_push_curve(start, end, limits.minimum, limits.maximum)
             if curve is not None:

@@ -113,6 +113,15 @@ def test_no_curve_is_missed_that_a_fine_grid_finds_with_room_to_spare():
     assert found > 15
 
 
+def test_a_creeping_search_for_a_feasible_curve_ends():
+    """Here the violation falls without end as k grows: a search without a cap never returned."""
+    start = np.array([-1.1734795229843267, -0.6099747722603714, 0.47404750469418655])
+    end = np.array([-0.6725623383453272, 0.5540100016967023, -0.5561434961352023])
+    limit = 1.578947365340034
+    curve = shortest_push_curve(start, end, -limit, limit)
+    assert curve is None or np.abs(curve.sample(2001)[2]).max() <= limit * (1 + 2e-3)
+
+
 def test_straight_push_is_straight():
     curve = shortest_push_curve(np.zeros(3), np.array([1.0, 0.0, 0.0]), -0.1, 0.1)
     assert curve.length == pytest.approx(1.0, abs=1e-4)

@@ -1,0 +1,172 @@
+"""The guess and the search against explicit graphs, the sweep against its definition."""
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from push_model import se2
+from push_planner import DistanceField, PlannerSettings, PushScene, shortest_push_curve
+from push_planner.candidate_poses import Candidates, nearby, runs, scattered
+from push_planner.guide_path import path_cost
+from push_planner.push_search import PushGraph, PushSearch, SearchStatistics
+from push_planner.rough_cost import guessed_length
+
+START = np.array([-0.9, -0.5, 0.4])
+GOALS = np.array([[0.9, 0.3, 0.2], [0.9, 0.3, 1.2], [-0.3, 0.4, 2.0], [0.6, 0.6, -0.9]])
+
+
+@pytest.fixture(scope="module")
+def scene(scenario, robot, box):
+    return PushScene(DistanceField(scenario.grid), robot, box, PlannerSettings())
+
+
+def graph_of(scene, seed, count=24):
+    random = np.random.default_rng(seed)
+    poses = random.uniform([-1.0, -0.6, -0.5], [1.0, 0.6, 0.9], (count, 3))
+    poses[::2, 1] *= 0.2  # some in the passage
+    return PushGraph(
+        scene, START, GOALS[seed], Candidates(poses, np.zeros(count)).free(scene), np.inf
+    )
+
+
+def cheapest(graph, length):
+    """Cost of the best plan, and of the way to every state, over explicit edges of a length."""
+    settings = graph.scene.settings
+    n, sides = len(graph.poses), len(graph.scene.sides)
+    # node i * sides + s: ready at i to push on s; n * sides + the same: arrived at i on s
+    rows, columns, weights = [], [], []
+    for i in range(n):
+        for s in range(sides):
+            if not graph.room[s, i]:
+                continue
+            for j in range(1, n):
+                edge = length(i, j, s) if j != i and i != n - 1 and graph.room[s, j] else np.inf
+                if np.isfinite(edge):
+                    rows.append(i * sides + s)
+                    columns.append((n + j) * sides + s)
+                    weights.append(edge + settings.push_cost)
+            for t in range(sides):
+                if graph.room[t, i] and i != 0:
+                    rows.append((n + i) * sides + s)
+                    columns.append(i * sides + t)
+                    weights.append(graph.side_change(i, s, t) + 1e-15)
+    size = 2 * n * sides
+    edges = csr_array((weights, (rows, columns)), shape=(size, size))
+    sources = [s for s in range(sides) if graph.room[s, 0]]
+    distance = dijkstra(edges, indices=sources).min(axis=0)
+    goal = slice((2 * n - 1) * sides, 2 * n * sides)
+    return float(distance[goal].min()), distance[: n * sides].reshape(n, sides)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_guessed_costs_are_those_of_dijkstra_on_the_explicit_graph(scene, seed):
+    graph = graph_of(scene, seed)
+    field, least = scene.field, scene.shape.inradius + scene.settings.safety_distance
+
+    def guess(i, j, s):
+        (ax, ay, _, ac, sa), (bx, by, _, bc, sb) = graph.robots[s, i], graph.robots[s, j]
+        length = guessed_length(ax, ay, ac, sa, bx, by, bc, sb, *graph.diameters[s])
+        if not np.isfinite(length):
+            return length
+        chord = np.linspace(graph.poses[i, :2], graph.poses[j, :2], 60)
+        near = np.mean([field.at(*point) < least for point in chord])
+        crossed = near * np.hypot(*(chord[-1] - chord[0]))
+        return length + 0.6 * min(1.0, crossed / 0.2)
+
+    best, states = cheapest(graph, guess)
+    ready, estimate = graph.rough_costs(np.inf)
+    known = np.isfinite(states[1:-1])
+    assert (np.isfinite(ready[1:-1]) == known).all() and known.sum() > 20
+    # The planner's look along a chord takes steps of 2 cm.
+    assert np.abs(ready[1:-1][known] - states[1:-1][known]).max() < 0.15
+    assert np.median(np.abs(ready[1:-1][known] - states[1:-1][known])) < 0.01
+    assert estimate == pytest.approx(best, abs=0.15)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 3])
+def test_the_search_is_as_good_as_trying_every_push(scene, seed):
+    graph = graph_of(scene, seed)
+    search = PushSearch(graph, np.inf, 1.0, 10**6)
+    statistics = SearchStatistics()
+    for _ in search.run(statistics):
+        pass
+    other = graph_of(scene, seed)
+    everything = SearchStatistics()
+
+    def length(i, j, s):
+        step = other.push(i, j, s, everything)
+        return np.inf if step is None else step.curve.length
+
+    best, _ = cheapest(other, length)
+    if not np.isfinite(best):
+        assert search.solution is None and search.exhausted
+        return
+    assert best - 1e-9 <= search.cost <= 1.02 * best
+    assert statistics.solved < 0.5 * everything.solved
+
+
+def test_a_bound_is_never_exceeded_and_an_exhausted_search_says_so(scene):
+    for seed in range(4):
+        free = PushSearch(graph_of(scene, seed), np.inf, 1.0, 10**6)
+        list(free.run(SearchStatistics()))
+        tight = PushSearch(graph_of(scene, seed), free.cost, 1.0, 10**6)
+        list(tight.run(SearchStatistics()))
+        assert tight.solution is None or tight.cost < free.cost
+        assert tight.exhausted or tight.solution is not None
+        hasty = PushSearch(graph_of(scene, seed), np.inf, 1.0, 1)
+        list(hasty.run(SearchStatistics()))
+        assert hasty.solution is not None or (hasty.expanded == 1 and not hasty.exhausted)
+
+
+def test_sweeps_are_as_clear_as_their_samples_one_by_one(scene):
+    random = np.random.default_rng(5)
+    compared = 0
+    for _ in range(200):
+        side = scene.sides[random.integers(len(scene.sides))]
+        start = random.uniform([-1.2, -0.8, -np.pi], [1.2, 0.8, np.pi])
+        end = se2.compose(start, random.uniform([0.3, -0.3, -0.6], [1.2, 0.3, 0.6]))
+        curve = shortest_push_curve(start, end, side.trusted.minimum, side.trusted.maximum)
+        if curve is None:
+            continue
+        points, heading, _ = curve.sample(max(8, int(curve.length / 0.01) + 2))
+        least = np.inf
+        for pose in np.column_stack([points, heading]):
+            item = se2.compose(pose, side.grasp)
+            outline = scene.field.clearance(scene.shape.dense_outline(0.01), item)
+            least = min(least, scene.robot_clearance(pose), outline)
+        swept = scene.curve_clearance(curve, side, -1.0)
+        assert swept == pytest.approx(least, abs=1e-6)
+        compared += least > 0.0
+    assert compared > 20
+
+
+def test_runs_end_where_a_push_of_that_length_leads(scene):
+    for direction in (1.0, -1.0):
+        ends = runs(scene, START, direction, 0.0, (0.2, 0.5)).poses
+        assert len(ends) == 6 * len(scene.sides)
+        found = 0
+        for number, side in enumerate(scene.sides):
+            for pose in ends[6 * number : 6 * number + 6]:
+                first, last = (START, pose) if direction > 0.0 else (pose, START)
+                curve = shortest_push_curve(
+                    side.robot_pose(first),
+                    side.robot_pose(last),
+                    side.trusted.minimum,
+                    side.trusted.maximum,
+                )
+                found += curve is not None and curve.length < 0.52
+        assert found == len(ends)
+
+
+def test_scattered_poses_lie_near_the_guide_and_nearby_ones_about_theirs(scene):
+    points = np.array([[-1.0, 0.0], [1.0, 0.0]])
+    guide = path_cost(scene.field, points, scene.settings)
+    cloud = scattered(scene, guide, 500, np.random.default_rng(1))
+    assert np.abs(cloud.poses[:, 1]).max() <= 1.0 and np.abs(cloud.poses[:, 0]).max() <= 2.0
+    assert (np.abs(cloud.poses[:, 0] - (cloud.way - 1.0)) <= 1.0 + 1e-9).all()
+    poses = np.array([START, GOALS[0]])
+    about = nearby(poses, 100, 0.05, np.random.default_rng(1)).poses.reshape(2, 100, 3)
+    assert np.array_equal(about[:, 0], poses)
+    assert about[:, :, :2].std(axis=1) == pytest.approx(0.05, rel=0.3)
+    assert about.mean(axis=1) == pytest.approx(poses, abs=0.1)

@@ -1,0 +1,168 @@
+"""Random problems in environment 1: plans that are valid, that only get better, and reasons."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.plan import cluttered, exhaustive, problems
+from push_model import se2
+from push_model.occupancy import rasterise
+from push_model.settings import SettingsError
+from push_model.specs import BoxSpec, EnvironmentSpec
+from push_planner import PlanError, PlannerSettings, PlanningFailed, PushPlanner
+
+COUNT = 30
+
+
+def attempt(planner, start, goal, seed=None):
+    """Every plan on the way, and why there is none."""
+    plans = []
+    try:
+        for progress in planner.plan(start, goal, seed):
+            if progress.best is not None and not (plans and plans[-1] is progress.best):
+                plans.append(progress.best)
+    except PlanningFailed as error:
+        return plans, error
+    return plans, None
+
+
+@pytest.fixture(scope="module")
+def planner(scenario, robot, box):
+    return PushPlanner(PlannerSettings(), scenario.grid, robot, box)
+
+
+@pytest.fixture(scope="module")
+def outcomes(planner):
+    return [(s, g, *attempt(planner, s, g)) for s, g in problems(planner, COUNT, 3)]
+
+
+def test_no_plan_is_worse_than_an_earlier_one(outcomes):
+    improved = 0
+    for _, _, plans, _ in outcomes:
+        costs = [p.cost for p in plans]
+        assert all(b < a for a, b in zip(costs, costs[1:], strict=False))
+        improved += len(costs) > 1
+    assert improved > COUNT / 2
+
+
+def test_nearly_every_problem_is_solved_and_the_others_say_why(outcomes):
+    unsolved = [error for _, _, _, error in outcomes if error is not None]
+    assert len(unsolved) <= 0.08 * COUNT
+    for error in unsolved:
+        assert error.code is PlanError.NO_PUSH_SEQUENCE
+        assert "start" in str(error) or "goal" in str(error)
+
+
+def test_costs_are_those_of_the_pushes_and_no_lower_than_the_bound(outcomes, planner):
+    settings = planner.settings
+    for start, goal, plans, _ in outcomes:
+        for plan in plans:
+            cost = sum(s.length + settings.push_cost for s in plan.segments)
+            for before, after in zip(plan.segments, plan.segments[1:], strict=False):
+                if before.side != after.side:
+                    way = before.robot_end[:2] - after.robot_start[:2]
+                    cost += np.hypot(*way) + settings.side_change_cost
+            assert plan.cost == pytest.approx(cost, abs=1e-9)
+            assert plan.cost >= planner.lower_bound(start, goal)
+
+
+def test_plans_join_start_and_goal_by_stable_pushes_that_touch_no_occupied_cell(
+    outcomes, planner, scenario, box, robot
+):
+    grid = scenario.grid
+    pushes = 0
+    for start, goal, plans, _ in outcomes:
+        for plan in plans[-1:]:
+            at = start
+            for segment in plan.segments:
+                pushes += 1
+                side = planner.scene.sides[segment.side]
+                assert segment.object_start[:2] == pytest.approx(at[:2])
+                assert abs(se2.wrap(segment.object_start[2] - at[2])) < 1e-9
+                v, omega = segment.trajectory.twist[1:-1].T
+                assert (omega <= (side.trusted.maximum + 1e-3) * v).all()
+                assert (omega >= (side.trusted.minimum - 1e-3) * v).all()
+                for pose in segment.trajectory.pose[::3]:
+                    corners = se2.transform(se2.compose(pose, side.grasp), box.geometry.outline)
+                    for x, y in [*corners, *se2.transform(pose, robot.outline)]:
+                        column, row = ((np.array([x, y]) - grid.origin) / grid.resolution).astype(
+                            int
+                        )
+                        assert not grid.occupied[row, column]
+                at = segment.object_end
+            assert at[:2] == pytest.approx(goal[:2]) and abs(se2.wrap(at[2] - goal[2])) < 1e-9
+    assert pushes > COUNT
+
+
+def test_equal_seeds_give_equal_plans_to_the_bit(outcomes, planner, scenario, robot, box):
+    other = PushPlanner(PlannerSettings(), scenario.grid, robot, box)
+    for start, goal, plans, _ in outcomes[:5]:
+        again, _ = attempt(other, start, goal)
+        assert [p.cost for p in again] == [p.cost for p in plans]
+        for a, b in zip(again[-1].segments, plans[-1].segments, strict=True):
+            assert np.array_equal(a.trajectory.pose, b.trajectory.pose)
+
+
+def test_clutter(robot, box):
+    """Plans among boxes and circles; what has none has none for an exhaustive search either."""
+    solved = 0
+    for seed in (1, 2):
+        planner = PushPlanner(PlannerSettings(), rasterise(cluttered(seed)), robot, box)
+        for start, goal in problems(planner, 6, seed):
+            plans, error = attempt(planner, start, goal)
+            solved += bool(plans)
+            assert plans or error is not None
+    assert solved >= 6
+
+
+def test_a_goal_that_the_robot_cannot_stand_behind_is_refused_at_once(robot, box):
+    """A niche as wide as the box: it stands free, but every push into it ends inside a wall."""
+    niche = EnvironmentSpec(
+        (3.0, 2.0),
+        boxes=(
+            BoxSpec((1.0, 0.09), (0.3, 0.04)),
+            BoxSpec((1.0, -0.09), (0.3, 0.04)),
+            BoxSpec((1.09, 0.0), (0.04, 0.22)),
+            BoxSpec((0.91, 0.0), (0.04, 0.22)),
+        ),
+    )
+    planner = PushPlanner(PlannerSettings(), rasterise(niche), robot, box)
+    work = planner.plan(np.array([-0.5, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]))
+    with pytest.raises(PlanningFailed, match="no side of the object can be pushed into the goal"):
+        next(work)
+
+
+def test_a_pose_within_the_safety_distance_is_refused_with_its_clearance(planner):
+    start, goal = np.array([-1.0, 0.0, 0.0]), np.array([1.447, 0.0, 0.0])
+    with pytest.raises(PlanningFailed, match=r"into the goal .* mm from an obstacle") as error:
+        next(planner.plan(start, goal))
+    assert error.value.code is PlanError.NO_PUSH_SEQUENCE
+    with pytest.raises(PlanningFailed, match="away from the start"):
+        next(planner.plan(goal, start))
+
+
+def test_a_start_that_no_push_leaves_is_named(planner):
+    """Beside the right wall and turned a little: every push goes into the wall or starts in it."""
+    start, goal = np.array([1.424, -0.135, -2.723]), np.array([-0.7, 0.4, 0.4])
+    assert np.isinf(exhaustive(planner, start, goal, 1))
+    with pytest.raises(PlanningFailed, match="no push leads away from the start"):
+        planner.solve(start, goal)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"run_lengths": (0.15, -0.3)},
+        {"run_lengths": (0.0,)},
+        {"run_lengths": (np.inf,)},
+        {"run_lengths": (np.nan,)},
+        {"scattered_poses": ()},
+        {"scattered_poses": (0, -5)},
+        {"heading_offsets": (np.nan,)},
+        {"lateral_offsets": (0.0, np.inf)},
+    ],
+)
+def test_settings_that_make_no_poses_are_refused_by_name(values):
+    with pytest.raises(SettingsError, match=next(iter(values))):
+        replace(PlannerSettings(), **values)
