@@ -9,7 +9,7 @@ from benchmarks.measure import at_least
 from push_ros.process import claim_domain
 from push_scenario.scenario import load_scenario
 from push_study.graph_run import LockstepRun
-from sim_bridge.world import World
+from sim_bridge.pybullet_world import PyBulletWorld
 
 
 def run(seconds: float = 20.0) -> dict[str, Any]:
@@ -24,7 +24,7 @@ def run(seconds: float = 20.0) -> dict[str, Any]:
         graph.observer.look_away()  # an instrument, not a part of the graph
         robots, objects = scenario.robots, scenario.objects
         poses = graph.bridge.world.poses()
-        with World(
+        with PyBulletWorld(
             scenario.environment,
             {n: (s, poses[n]) for n, (s, _) in robots.items()},
             {n: (s, poses[n]) for n, (s, _) in objects.items()},
