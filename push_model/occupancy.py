@@ -1,13 +1,17 @@
 """Occupancy grids of environments."""
 
 import math
+from array import array
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from push_model.arrays import Array
 from push_model.specs import EnvironmentSpec
+
+_TOUCH = 1e-7  # of a cell: an obstacle that only touches a cell does not reach into it
 
 
 @dataclass(frozen=True)
@@ -46,20 +50,22 @@ class OccupancyGrid:
         return points[np.sort(first)] * self.resolution + self.origin
 
     def rectangles(self) -> Array:
-        """``(n, 4)`` x_min, x_max, y_min, y_max [m] of disjoint rectangles of occupied cells."""
-        left = self.occupied.copy()
-        found = []
-        for row, column in np.argwhere(left).tolist():
-            if not left[row, column]:
-                continue
-            across = left[row, column:]
-            gaps = np.flatnonzero(~across)
-            width = int(gaps[0]) if len(gaps) else across.shape[0]
-            full = left[row:, column : column + width].all(axis=1)
-            ends = np.flatnonzero(~full)
-            height = int(ends[0]) if len(ends) else full.shape[0]
-            left[row : row + height, column : column + width] = False
-            found.append((column, column + width, row, row + height))
+        """``(n, 4)`` x_min, x_max, y_min, y_max [m] of disjoint rectangles of occupied cells.
+
+        Runs of occupied cells along the rows; equal runs in rows one above the other are one.
+        """
+        found = array("l")  # flat: maps can have a million rectangles
+        open_runs: dict[tuple[int, int], int] = {}
+        rows = self.occupied.shape[0]
+        for row in range(rows + 1):
+            runs: dict[tuple[int, int], int] = {}
+            if row < rows:
+                steps = np.diff(self.occupied[row].astype(np.int8), prepend=0, append=0)
+                ends = np.flatnonzero(steps).reshape(-1, 2).tolist()
+                runs = {(a, b): open_runs.pop((a, b), row) for a, b in ends}
+            for (a, b), first in open_runs.items():
+                found.extend((a, b, first, row))
+            open_runs = runs
         corners = np.array(found, dtype=np.float64).reshape(-1, 4) * self.resolution
         return corners + self.origin[[0, 0, 1, 1]]
 
@@ -74,33 +80,63 @@ class MapSpec:
 
 
 def rasterise(environment: EnvironmentSpec | MapSpec, border: int = 2) -> OccupancyGrid:
-    """The grid of an environment; a cell is occupied when its centre is, the border always."""
+    """The grid of an environment; a cell is occupied when an obstacle reaches into it.
+
+    So no part of an obstacle is left out, and none is more than a cell's diagonal too large. The
+    border is occupied always.
+    """
     if isinstance(environment, MapSpec):
         return environment.grid
     r = environment.resolution
-    columns = math.ceil(environment.size[0] / r - 1e-9) + 2 * border
-    rows = math.ceil(environment.size[1] / r - 1e-9) + 2 * border
+    columns = math.ceil(environment.size[0] / r - _TOUCH) + 2 * border
+    rows = math.ceil(environment.size[1] / r - _TOUCH) + 2 * border
     origin = np.array([-columns * r / 2.0, -rows * r / 2.0])
-    x = origin[0] + (np.arange(columns) + 0.5) * r
-    y = origin[1] + (np.arange(rows) + 0.5) * r
-    gx, gy = np.meshgrid(x, y)
-    half_x, half_y = environment.size[0] / 2.0, environment.size[1] / 2.0
-    occupied = (np.abs(gx) > half_x) | (np.abs(gy) > half_y)
+    half = np.array(environment.size) / (2.0 * r)
+    low = np.ceil(np.array([columns, rows]) / 2.0 - half - _TOUCH).astype(int)
+    high = np.floor(np.array([columns, rows]) / 2.0 + half + _TOUCH).astype(int)
+    occupied = np.ones((rows, columns), dtype=np.bool_)
+    occupied[low[1] : high[1], low[0] : high[0]] = False
     for box in environment.boxes:
         c, s = math.cos(box.yaw), math.sin(box.yaw)
-        dx, dy = gx - box.centre[0], gy - box.centre[1]
-        u, v = c * dx + s * dy, -s * dx + c * dy
-        occupied |= (np.abs(u) <= box.size[0] / 2.0) & (np.abs(v) <= box.size[1] / 2.0)
+        corners = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * box.size / 2.0
+        vertices = corners @ np.array([[c, s], [-s, c]]) + box.centre
+        _fill_polygon(occupied, (vertices - origin) / r)
     for circle in environment.circles:
-        occupied |= np.hypot(gx - circle.centre[0], gy - circle.centre[1]) <= circle.radius
+        _fill_circle(occupied, (np.array(circle.centre) - origin) / r, circle.radius / r)
     for polygon in environment.polygons:
-        vertices = np.array(polygon.vertices)
-        ends = np.roll(vertices, -1, axis=0)
-        side = np.stack(
-            [
-                (b[0] - a[0]) * (gy - a[1]) - (b[1] - a[1]) * (gx - a[0])
-                for a, b in zip(vertices, ends, strict=True)
-            ]
-        )
-        occupied |= (side >= 0.0).all(axis=0) | (side <= 0.0).all(axis=0)
+        _fill_polygon(occupied, (np.array(polygon.vertices) - origin) / r)
     return OccupancyGrid(occupied, r, origin)
+
+
+def _window(occupied: NDArray[np.bool_], low: Array, high: Array) -> tuple[Any, Array, Array]:
+    """The cells that lie in a box of cell units, with the x and y of their centres."""
+    first = np.maximum(np.floor(low + _TOUCH).astype(int), 0)
+    last = np.maximum(np.minimum(np.ceil(high - _TOUCH).astype(int), occupied.shape[::-1]), first)
+    x, y = np.arange(first[0], last[0]) + 0.5, (np.arange(first[1], last[1]) + 0.5)[:, None]
+    return occupied[first[1] : last[1], first[0] : last[0]], x, y
+
+
+def _fill_polygon(occupied: NDArray[np.bool_], vertices: Array) -> None:
+    """Occupy what a convex polygon ``(n, 2)`` in cell units overlaps.
+
+    Two convex shapes overlap unless the direction of a side of one of them parts them: the window
+    is the directions of the cells, the sides of the polygon are the others.
+    """
+    cells, x, y = _window(occupied, vertices.min(axis=0), vertices.max(axis=0))
+    ends = np.roll(vertices, -1, axis=0)
+    turn = vertices[:, 0] @ ends[:, 1] - vertices[:, 1] @ ends[:, 0]
+    overlap = np.ones(cells.shape, dtype=np.bool_)
+    for a, b in zip(vertices, ends, strict=True):
+        length = math.hypot(b[0] - a[0], b[1] - a[1])
+        nx, ny = np.array([a[1] - b[1], b[0] - a[0]]) * math.copysign(1.0, turn) / length
+        inside = nx * (x - a[0]) + ny * (y - a[1]) + 0.5 * (abs(nx) + abs(ny))
+        overlap &= inside > _TOUCH
+    cells |= overlap
+
+
+def _fill_circle(occupied: NDArray[np.bool_], centre: Array, radius: float) -> None:
+    """Occupy what a disc in cell units overlaps."""
+    cells, x, y = _window(occupied, centre - radius, centre + radius)
+    dx = np.maximum(np.abs(x - centre[0]) - 0.5, 0.0)
+    dy = np.maximum(np.abs(y - centre[1]) - 0.5, 0.0)
+    cells |= np.hypot(dx, dy) < radius - _TOUCH

@@ -1,13 +1,15 @@
 """Exact geometry of closed outlines ``(n, 2)`` [m]: hulls, containment, overlap, distance.
 
-Outlines are simple polygons; those called convex are convex and counter-clockwise. Comparisons are
-free of tolerances unless one is asked for.
+An outline is a simple polygon, convex or not, either way round; one that is called convex is convex
+and counter-clockwise. Touching is not overlapping, as far as rounding lets one tell.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
 from push_model.arrays import Array
+
+Mask = NDArray[np.bool_]
 
 
 def convex_hull(points: Array) -> Array:
@@ -25,14 +27,91 @@ def convex_hull(points: Array) -> Array:
     return np.array([*chain(ordered), *chain(ordered[::-1])])
 
 
-def inside_convex(outline: Array, points: Array, margin: float = 0.0) -> NDArray[np.bool_]:
+def inside_convex(outline: Array, points: Array, margin: float = 0.0) -> Mask:
     """Which points ``(k, 2)`` lie in a convex outline and over ``margin`` [m] from its edges."""
     edge = np.roll(outline, -1, axis=0) - outline
     normal = np.column_stack([-edge[:, 1], edge[:, 0]]) / np.hypot(*edge.T)[:, None]
     depth = np.asarray(points) @ normal.T - (normal * outline).sum(axis=1)
-    inside: NDArray[np.bool_] = (depth > margin).all(axis=1)
+    inside: Mask = (depth > margin).all(axis=1)
     return inside
+
+
+def inside(outline: Array, points: Array) -> Mask:
+    """Which points ``(k, 2)`` lie in an outline: an odd number of edges to their right."""
+    x, y = np.asarray(points, dtype=np.float64).reshape(-1, 2).T[:, :, None]
+    ax, ay = outline.T
+    bx, by = np.roll(outline, -1, axis=0).T
+    crosses = (ay > y) != (by > y)
+    level = np.where(crosses, by - ay, 1.0)
+    odd: Mask = (crosses & (x < ax + (y - ay) * (bx - ax) / level)).sum(axis=1) % 2 == 1
+    return odd
+
+
+def distance(outline: Array, points: Array) -> Array:
+    """``(k,)`` [m] of points ``(k, 2)`` from the line of an outline, inside or outside."""
+    edge = np.roll(outline, -1, axis=0) - outline
+    to = np.asarray(points, dtype=np.float64).reshape(-1, 1, 2) - outline
+    along = np.clip((to * edge).sum(axis=2) / (edge * edge).sum(axis=1), 0.0, 1.0)
+    away = to - along[:, :, None] * edge
+    least: Array = np.hypot(away[:, :, 0], away[:, :, 1]).min(axis=1)
+    return least
+
+
+def overlap(first: Array, second: Array) -> bool:
+    """Whether two outlines have an area in common."""
+    if (first.max(axis=0) <= second.min(axis=0)).any():
+        return False
+    if (second.max(axis=0) <= first.min(axis=0)).any():
+        return False
+    if _edges_cross(first, second):
+        return True
+    # No edges cross: one holds the other, or they are apart. A corner may lie on the other's line,
+    # where neither is said; the middles of edges and the corners are not all there.
+    return bool(_some_inside(first, second) or _some_inside(second, first))
+
+
+def overlaps_disc(outline: Array, centre: Array, radius: float) -> bool:
+    """Whether an outline and a disc have an area in common."""
+    at = np.asarray(centre, dtype=np.float64)[None]
+    return bool(inside(outline, at)[0] or distance(outline, at)[0] < radius)
+
+
+def cells_hit(outline: Array, corners: Array, size: float) -> Mask:
+    """Which square cells have an area in common with an outline.
+
+    Parameters
+    ----------
+    corners: ``(k, 2)`` [m] the lower left of each cell. size: [m] of a cell's side.
+    """
+    hit = inside(outline, corners + 0.5 * size)
+    for a, b in zip(outline, np.roll(outline, -1, axis=0), strict=True):
+        low, high = np.minimum(a, b), np.maximum(a, b)
+        near = ((corners < high) & (corners + size > low)).all(axis=1)
+        normal = np.array([a[1] - b[1], b[0] - a[0]])
+        middle = (corners + 0.5 * size - a) @ normal
+        hit |= near & (np.abs(middle) < 0.5 * size * np.abs(normal).sum())
+    return hit
 
 
 def _turn(a: Array, b: Array, c: Array) -> float:
     return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+
+
+def _edges_cross(first: Array, second: Array) -> bool:
+    a, b = first[:, None], np.roll(first, -1, axis=0)[:, None]
+    c, d = second[None], np.roll(second, -1, axis=0)[None]
+
+    def turn(p: Array, q: Array, r: Array) -> Array:
+        left: Array = (q[..., 0] - p[..., 0]) * (r[..., 1] - p[..., 1])
+        return left - (q[..., 1] - p[..., 1]) * (r[..., 0] - p[..., 0])
+
+    apart = (turn(a, b, c) * turn(a, b, d) < 0.0) & (turn(c, d, a) * turn(c, d, b) < 0.0)
+    return bool(apart.any())
+
+
+def _some_inside(outline: Array, other: Array) -> bool:
+    points = np.vstack([other, 0.5 * (other + np.roll(other, -1, axis=0)), other.mean(axis=0)])
+    held = inside(outline, points)
+    size = float(np.ptp(outline, axis=0).max())
+    held[-1] &= bool(inside(other, points[-1:])[0])
+    return bool((held & (distance(outline, points) > 1e-12 * size)).any())

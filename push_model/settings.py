@@ -25,7 +25,7 @@ from pydantic import AllowInfNan, BeforeValidator, Strict
 
 from push_model.settings_errors import SettingsError, explained
 
-__all__ = ["SettingsError", "bounded", "from_mapping", "settings"]
+__all__ = ["SettingsError", "bounded", "from_mapping", "settings", "told_by_key"]
 
 T = TypeVar("T")
 _CONFIG = pydantic.ConfigDict(extra="forbid", validate_default=True)
@@ -46,6 +46,21 @@ def bounded(
     if default is dataclasses.MISSING:
         return dataclasses.field(metadata=metadata)
     return dataclasses.field(default=default, metadata=metadata)
+
+
+def told_by_key(*kinds: str) -> BeforeValidator:
+    """Lets ``{rectangle: {...}}`` say ``{kind: rectangle, ...}``; put it in ``Annotated``."""
+
+    def told_by_kind(value: Any) -> Any:
+        if isinstance(value, Mapping) and "kind" not in value:
+            kind, inner = next(iter(value.items()), (None, None))
+            if len(value) == 1 and kind in kinds and isinstance(inner, Mapping):
+                return {**inner, "kind": kind}
+        elif isinstance(value, Mapping) or dataclasses.is_dataclass(value):
+            return value
+        raise SettingsError(f"expected one key of {', '.join(kinds)} with a mapping, got {value!r}")
+
+    return BeforeValidator(told_by_kind)
 
 
 @typing.dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field,))

@@ -3,14 +3,12 @@
 ``{kind: rectangle, length: 0.09, width: 0.09}`` says the same.
 """
 
-from collections.abc import Mapping
 from dataclasses import field
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator
 
-from push_model.settings import SettingsError, bounded, from_mapping, settings
+from push_model.settings import bounded, from_mapping, settings, told_by_key
 from push_model.shapes import Shape, ellipse, flower, polygon, rectangle
 
 
@@ -74,25 +72,9 @@ class FlowerShape:
         return flower(self.radius, self.amplitude, self.petals)
 
 
-_KINDS = ("rectangle", "polygon", "ellipse", "flower")
-
-
-def _told_by_kind(value: Any) -> Any:
-    """``{rectangle: {...}}`` as ``{kind: rectangle, ...}``."""
-    if not isinstance(value, Mapping):
-        if type(value) in (RectangleShape, PolygonShape, EllipseShape, FlowerShape):
-            return value
-    elif "kind" in value:
-        return value
-    elif len(value) == 1:
-        ((kind, inner),) = value.items()
-        if kind in _KINDS and isinstance(inner, Mapping) and "kind" not in inner:
-            return {"kind": kind, **inner}
-    raise SettingsError(f"expected one key of {', '.join(_KINDS)} with a mapping, got {value!r}")
-
-
 ShapeSpec = Annotated[
-    RectangleShape | PolygonShape | EllipseShape | FlowerShape, BeforeValidator(_told_by_kind)
+    RectangleShape | PolygonShape | EllipseShape | FlowerShape,
+    told_by_key("rectangle", "polygon", "ellipse", "flower"),
 ]
 
 

@@ -3,8 +3,13 @@
 (2.1) adds the length to the reciprocal of the least clearance, a bottleneck: costs of edges do not
 add up to it. The sweep below asks RRT* for the shortest path at several least clearances and takes
 the best by (2.1), which is exact in the limit of many thresholds.
+
+Which clearances there are to ask for is not left to chance: the widest way over the lattice of the
+distance field says how wide a path can be, and whether there is one. Where samples miss a way that
+is known to be there, or find one that is much longer, that way itself is the guide.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -14,8 +19,18 @@ import ompl.geometric as og
 import ompl.util as ou
 
 from push_model.arrays import Array
+from push_model.shapes import Shape
 from push_planner.distance_field import DistanceField
+from push_planner.grid_search import shortest_way
+from push_planner.room import room_at, segment_keeps, slack_at, straightened
 from push_planner.settings import PlannerSettings
+from push_planner.widest_way import escape_radius, widest_clearance
+
+_NO_CIRCLES: Array = np.zeros((0, 3))
+_NO_ENDS: Array = np.zeros((0, 4))
+_LONGER = 1.05  # times the way on the lattice: a path of samples that long has missed that way
+_NARROWER = 0.98  # of the widest clearance, to leave samples some room
+_GAIN = 0.01  # of the cost: a wider level that can save no more than this is not tried
 
 ou.setLogLevel(ou.LogLevel.LOG_NONE)
 
@@ -30,24 +45,54 @@ class GuidePath:
     clearance: float
 
 
+class NoGuidePath(Exception):
+    """Raised when no path is wide enough; widest: [m] clearance of the widest, 0 without any."""
+
+    def __init__(self, widest: float) -> None:
+        super().__init__(f"the widest path has a clearance of {widest:.3f} m")
+        self.widest = widest
+
+
 class _Validity(ob.StateValidityChecker):  # type: ignore[misc]
-    def __init__(self, information: ob.SpaceInformation, field: DistanceField, least: float):
+    def __init__(
+        self, information: ob.SpaceInformation, field: DistanceField, ends: Array, least: float
+    ):
         super().__init__(information)
-        self._at = field.at
-        self._least = least
+        self._field = field
+        self._ends = ends
+        self._least = least * field.args[2]
 
     def isValid(self, state: ob.State) -> bool:  # noqa: N802 (OMPL's name)
-        return bool(self._at(state[0], state[1]) >= self._least)
+        ox, oy, scale = self._field.args
+        u, v = (state[0] - ox) * scale, (state[1] - oy) * scale
+        room = room_at(self._field.values, _NO_CIRCLES, 0.0, u, v)
+        return bool(room >= self._least - slack_at(self._ends, u, v))
 
 
 class _Motion(ob.MotionValidator):  # type: ignore[misc]
-    def __init__(self, information: ob.SpaceInformation, field: DistanceField, least: float):
+    def __init__(
+        self, information: ob.SpaceInformation, field: DistanceField, ends: Array, least: float
+    ):
         super().__init__(information)
         self._field = field
-        self._least = least
+        self._ends = ends
+        self._least = least * field.args[2]
 
     def checkMotion(self, a: ob.State, b: ob.State, last: object = None) -> bool:  # noqa: N802
-        return bool(self._field.segment((a[0], a[1]), (b[0], b[1]), self._least) >= self._least)
+        ox, oy, scale = self._field.args
+        return bool(
+            segment_keeps(
+                self._field.values,
+                _NO_CIRCLES,
+                0.0,
+                self._ends,
+                self._least,
+                (a[0] - ox) * scale,
+                (a[1] - oy) * scale,
+                (b[0] - ox) * scale,
+                (b[1] - oy) * scale,
+            )
+        )
 
 
 def shortest_path(
@@ -58,8 +103,12 @@ def shortest_path(
     iterations: int,
     extension: float,
     seed: int,
+    ends: Array = _NO_ENDS,
 ) -> Array | None:
-    """RRT* over R^2: points ``(n, 2)`` [m] whose segments keep a clearance [m], or None."""
+    """RRT* over R^2: points ``(n, 2)`` [m] whose segments keep a clearance [m], or None.
+
+    ends: ``(n, 4)`` where less will do, see ``relieved_ends``.
+    """
     x0, x1, y0, y1 = field.grid.extent
     space = ob.RealVectorStateSpace(2)
     bounds = ob.RealVectorBounds(2)
@@ -71,8 +120,8 @@ def shortest_path(
     ou.RNG.setSeed(seed)
     setup = og.SimpleSetup(space)
     information = setup.getSpaceInformation()
-    validity = _Validity(information, field, clearance)
-    motion = _Motion(information, field, clearance)
+    validity = _Validity(information, field, ends, clearance)
+    motion = _Motion(information, field, ends, clearance)
     setup.setStateValidityChecker(validity)
     information.setMotionValidator(motion)
     first, last = space.allocState(), space.allocState()
@@ -88,28 +137,107 @@ def shortest_path(
         return None
     states = setup.getSolutionPath().getStates()
     points = np.array([[s[0], s[1]] for s in states])
-    return _shortcut(field, points, clearance)
+    return _shortcut(field, points, clearance, ends)
 
 
-def _shortcut(field: DistanceField, points: Array, clearance: float) -> Array:
+def lattice_path(
+    field: DistanceField, start: Array, goal: Array, clearance: float, ends: Array = _NO_ENDS
+) -> Array | None:
+    """As ``shortest_path``, over the lattice of the field: never misses what its points connect."""
+    level = clearance * field.args[2] * (1.0 - 1e-9)
+    tips = field.lattice(start[:2]), field.lattice(goal[:2])
+    way = shortest_way(field.values, _NO_CIRCLES, 0.0, *tips, ends, level, exact=True)
+    if not len(way):
+        return None
+    points = way * field.spacing + field.args[:2]
+    points[0], points[-1] = start[:2], goal[:2]
+    return _shortcut(field, points, clearance, ends)
+
+
+def _shortcut(field: DistanceField, points: Array, clearance: float, ends: Array) -> Array:
     """Leave out points as long as the straight way keeps the clearance."""
-    kept = [points[0]]
-    i = 0
-    while i < len(points) - 1:
-        j = len(points) - 1
-        while j > i + 1 and field.segment(points[i], points[j], clearance) < clearance:
-            j -= 1
-        kept.append(points[j])
-        i = j
-    return np.array(kept)
+    level = clearance * field.args[2]
+    kept = straightened(field.values, _NO_CIRCLES, 0.0, ends, level, field.lattice(points))
+    result: Array = kept * field.spacing + field.args[:2]
+    result[0], result[-1] = points[0], points[-1]
+    return result
 
 
-def path_cost(field: DistanceField, points: Array, settings: PlannerSettings) -> GuidePath:
-    """(2.1) of a path ``(n, 2)``."""
+def relieved_ends(
+    field: DistanceField, start: Array, goal: Array, least: float, floor: float
+) -> Array:
+    """Where a path may have less clearance than ``least`` [m], because its end has less.
+
+    Within the least radius about the end from which a way with ``floor`` [m] leads to a place that
+    has enough.
+
+    Returns
+    -------
+    ``(2, 4)``: x, y, radius, and how much less, in spacings of the field's lattice.
+    """
+    ends = np.zeros((2, 4))
+    scale = field.args[2]
+    for k, tip in enumerate((start, goal)):
+        there = field.at(tip[0], tip[1])
+        ends[k, :2] = field.lattice(tip[:2])
+        if there >= least:
+            continue
+        lowest = min(floor, there) * scale - 1e-9
+        # A point that lies between those of the lattice may have more room than any of them.
+        for low in (lowest, lowest - 0.75):
+            radius = escape_radius(field.values, _NO_CIRCLES, 0.0, ends[k, :2], least * scale, low)
+            if math.isfinite(radius):
+                ends[k, 2:] = radius, least * scale - low
+                break
+    return ends
+
+
+def path_cost(
+    field: DistanceField, points: Array, settings: PlannerSettings, ends: Array = _NO_ENDS
+) -> GuidePath:
+    """(2.1) of a path ``(n, 2)``; its clearance does not count where ``ends`` allow less.
+
+    All paths have the ends in common: what they lack there tells none from another.
+    """
     length = float(np.hypot(*np.diff(points, axis=0).T).sum())
-    clearance = min(field.segment(a, b) for a, b in zip(points[:-1], points[1:], strict=True))
+    pieces = [
+        p for a, b in zip(points[:-1], points[1:], strict=True) for p in _cut(field, a, b, ends)
+    ]
+    counted = [(a, b) for a, b, relieved in pieces if not relieved]
+    clearance = min(field.segment(a, b) for a, b in counted or [p[:2] for p in pieces])
     cost = settings.length_weight * length + settings.clearance_weight / max(clearance, 1e-6)
     return GuidePath(points, cost, length, clearance)
+
+
+def _cut(field: DistanceField, a: Array, b: Array, ends: Array) -> list[tuple[Array, Array, bool]]:
+    """A segment cut where it enters or leaves the discs about relieved ends, and what is inside."""
+    along = b - a
+    square = float(along @ along)
+    cuts = [0.0, 1.0]
+    for u, v, radius, _ in ends[ends[:, 3] > 0.0] if square > 0.0 else _NO_ENDS:
+        out = a - (np.array([u, v]) * field.spacing + field.args[:2])
+        half = float(along @ out) / square
+        root = half**2 - (float(out @ out) - (radius * field.spacing) ** 2) / square
+        if root > 0.0:
+            cuts += [t for t in (-half - math.sqrt(root), -half + math.sqrt(root)) if 0.0 < t < 1.0]
+    cuts.sort()
+    result = []
+    for t0, t1 in zip(cuts[:-1], cuts[1:], strict=True):
+        middle = field.lattice(a + 0.5 * (t0 + t1) * along)
+        result.append((a + t0 * along, a + t1 * along, slack_at(ends, *middle) > 0.0))
+    return result
+
+
+def origin_floor(shape: Shape) -> float:
+    """[m] that a shape's origin keeps from obstacles wherever the shape can stand.
+
+    Its least distance to the outline, which is half the width of a box; 0 if it lies outside.
+    """
+    x, y = shape.outline.T
+    x1, y1 = np.roll(x, -1), np.roll(y, -1)
+    crosses = (y > 0.0) != (y1 > 0.0)
+    at = x[crosses] - y[crosses] * (x1 - x)[crosses] / (y1 - y)[crosses]
+    return shape.inradius if np.count_nonzero(at > 0.0) % 2 else 0.0
 
 
 def guide_paths(
@@ -119,23 +247,73 @@ def guide_paths(
     least: float,
     settings: PlannerSettings,
     seed: int,
+    easy: float = 0.0,
+    floor: float = 0.0,
 ) -> Iterator[GuidePath]:
     """The sweep: a path for each clearance threshold, from the widest down.
 
     Parameters
     ----------
-    least: [m] clearance that every path must keep, from the object's footprint.
+    least: [m] clearance without which the object fits in no orientation.
+    easy: [m] clearance with which it fits in every orientation. Paths with less come last, and only
+        where there are no others or (2.1) prefers them.
+    floor: [m] of the object's origin from obstacles that it has wherever it can stand.
+
+    Raises
+    ------
+    NoGuidePath: no way is as wide as ``least``; from the first ``next``.
     """
-    widest = min(field.at(start[0], start[1]), field.at(goal[0], goal[1]))
-    top = max(least, 0.98 * widest)
-    levels = np.geomspace(top, least, settings.clearance_levels) if top > least else [least]
-    for level in levels:
-        # A wide level is tried even where only a narrow one can work: it fails fast.
-        points = shortest_path(
-            field, start, goal, float(level), settings.rrt_iterations, settings.rrt_range, seed
-        )
-        if points is not None:
-            yield path_cost(field, points, settings)
+    easy = max(least, easy)
+    ends = relieved_ends(field, start, goal, least, floor)
+    tight = min(field.at(start[0], start[1]), field.at(goal[0], goal[1]))
+    # However wide, a path saves no more than the bottleneck's term of (2.1).
+    shortest = settings.length_weight * float(np.hypot(*(goal[:2] - start[:2])))
+    wide = settings.clearance_weight / max(_GAIN * shortest, 1e-9)
+    cap = max(easy, min(_NARROWER * tight, wide))
+    scale = field.args[2]
+    tips = field.lattice(start[:2]), field.lattice(goal[:2])
+    widest = widest_clearance(field.values, *tips, ends, least * scale, cap * scale) / scale
+    # A way between the points of the lattice may be wider than theirs by so much.
+    if widest + math.sqrt(0.5) * field.spacing < least or widest == 0.0:
+        raise NoGuidePath(widest)
+    top = cap if widest >= cap else _NARROWER * widest
+    low = min(easy, top)
+    count = settings.clearance_levels if top > 1.05 * low else 1
+    found: list[GuidePath] = []
+    for level in np.geomspace(top, low, count):
+        path = _path_at(field, start, goal, float(level), settings, seed, ends)
+        if path is None or (found and np.array_equal(path.points, found[-1].points)):
+            continue
+        found.append(path)
+        yield path
+        if len(path.points) == 2:  # straight on: no other level can be better
+            break
+    best = min((path.cost for path in found), default=math.inf)
+    narrow = lattice_path(field, start, goal, least, ends) if least < low else None
+    if narrow is not None and path_cost(field, narrow, settings, ends).cost < best:
+        path = _path_at(field, start, goal, least, settings, seed, ends)
+        assert path is not None
+        yield path
+
+
+def _path_at(
+    field: DistanceField,
+    start: Array,
+    goal: Array,
+    level: float,
+    settings: PlannerSettings,
+    seed: int,
+    ends: Array,
+) -> GuidePath | None:
+    """RRT*'s path with a clearance [m], unless the lattice has a much shorter one."""
+    sampled = shortest_path(
+        field, start, goal, level, settings.rrt_iterations, settings.rrt_range, seed, ends
+    )
+    known = lattice_path(field, start, goal, level, ends)
+    paths = [path_cost(field, p, settings, ends) for p in (sampled, known) if p is not None]
+    if len(paths) == 2:
+        return paths[0] if paths[0].length <= _LONGER * paths[1].length else paths[1]
+    return paths[0] if paths else None
 
 
 def waypoints(path: GuidePath, spacing: float) -> tuple[Array, Array, Array]:

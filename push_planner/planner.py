@@ -14,7 +14,7 @@ from push_model.push_segment import PushSegment
 from push_model.specs import ObjectSpec, RobotSpec
 from push_model.trajectory import along_curve
 from push_planner.distance_field import DistanceField
-from push_planner.guide_path import GuidePath, guide_paths
+from push_planner.guide_path import GuidePath, NoGuidePath, guide_paths, origin_floor
 from push_planner.push_search import PushSearch, PushStep, SearchStatistics
 from push_planner.scene import PushScene
 from push_planner.settings import PlannerSettings
@@ -194,12 +194,24 @@ class PushPlanner:
         return best
 
     def _guides(self, start: Array, goal: Array, seed: int) -> Iterator[GuidePath]:
-        shape, field = self.scene.shape, self.scene.field
-        margin = self.settings.safety_distance
-        tight = min(field.at(start[0], start[1]), field.at(goal[0], goal[1]))
-        # A start or goal beside a wall is fine in its own orientation: ask no more of the path.
-        least = min(shape.circumradius + margin, max(0.98 * tight, shape.inradius))
-        yield from guide_paths(field, start, goal, least, self.settings, seed)
+        shape, margin = self.scene.shape, self.settings.safety_distance
+        floor = origin_floor(shape)
+        least = floor + margin
+        easy = shape.circumradius + margin
+        try:
+            yield from guide_paths(
+                self.scene.field, start, goal, least, self.settings, seed, easy, floor
+            )
+        except NoGuidePath as error:
+            if error.widest == 0.0:
+                raise PlanningFailed(
+                    PlanError.NO_GUIDE_PATH, "obstacles part start and goal: no way connects them"
+                ) from None
+            raise PlanningFailed(
+                PlanError.NO_GUIDE_PATH,
+                f"the widest way from start to goal is {2.0 * error.widest:.3f} m wide on the map, "
+                f"the object needs {2.0 * least:.3f} m",
+            ) from None
 
     def segment(self, step: PushStep) -> PushSegment:
         """A push with its time-parametrised reference."""

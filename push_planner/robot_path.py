@@ -4,17 +4,16 @@ import math
 from enum import IntEnum
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import dijkstra
 
 from push_model import se2
 from push_model.arrays import Array
 from push_model.specs import RobotSpec
 from push_model.trajectory import Trajectory, concatenate, line, rotation
 from push_planner.distance_field import DistanceField
+from push_planner.grid_search import shortest_way
+from push_planner.room import room_at, straightened
 from push_planner.settings import PlannerSettings
-
-_CELL = 0.02  # [m] of the search grid
+from push_planner.widest_way import escape_radius
 
 
 class RobotPathError(IntEnum):
@@ -42,7 +41,10 @@ def plan_robot_path(
     goal: Array,
     circles: Array,
 ) -> Trajectory:
-    """Shortest way that keeps the robot's turning circle clear of the map and of circles.
+    """Short way that keeps the robot's turning circle clear of the map and of circles.
+
+    It keeps ``safety_distance`` as well, but where start or goal has less it keeps what they have
+    until it has come away from them.
 
     Parameters
     ----------
@@ -54,97 +56,63 @@ def plan_robot_path(
     NoRobotPath
     """
 
-    def clearance(x: Array, y: Array) -> Array:
-        room = np.array([field.at(a, b) for a, b in zip(x, y, strict=True)])
-        room -= robot.footprint_radius
-        for cx, cy, radius in circles:
-            room = np.minimum(room, np.hypot(x - cx, y - cy) - radius)
-        return room
-
-    ends = clearance(np.array([start[0], goal[0]]), np.array([start[1], goal[1]]))
-    # The robot may already stand closer than it would like: ask no more than both ends have.
-    slack = robot.footprint_radius - robot.body_radius
-    needed = min(settings.safety_distance, float(ends.min()) - 1e-9)
-    if ends[0] < -slack:
-        raise NoRobotPath(RobotPathError.START_BLOCKED, "the robot stands too close to an obstacle")
-    if ends[1] < -slack:
-        raise NoRobotPath(
-            RobotPathError.GOAL_BLOCKED, "the robot's goal is too close to an obstacle"
+    body = robot.footprint_radius * field.args[2]
+    need = settings.safety_distance * field.args[2]
+    # A bumper's corners reach farther than the body: with it in between, the robot can still leave.
+    least = (robot.body_radius - robot.footprint_radius) * field.args[2]
+    disc = np.zeros((len(circles), 3))
+    if len(circles):
+        disc[:, :2] = field.lattice(circles[:, :2])
+        disc[:, 2] = circles[:, 2] * field.args[2]
+    tips = [field.lattice(np.asarray(pose[:2])) for pose in (start, goal)]
+    ends = np.zeros((2, 4))
+    for k, (tip, code, what) in enumerate(
+        (
+            (tips[0], RobotPathError.START_BLOCKED, "the robot stands"),
+            (tips[1], RobotPathError.GOAL_BLOCKED, "the robot's goal is"),
         )
-    points = _grid_path(field, start, goal, circles, robot.footprint_radius + needed, needed)
-    points = _straighten(points, field, circles, robot.footprint_radius + needed, needed)
+    ):
+        room = room_at(field.values, disc, body, tip[0], tip[1])
+        if room < least:
+            raise NoRobotPath(
+                code,
+                f"{what} too close to an obstacle: {(room + body) * field.spacing:.3f} m of "
+                f"{robot.body_radius:.3f} m",
+            )
+        ends[k] = (*tip, *_relief(field, disc, body, tip, room, need, least))
+    way = shortest_way(field.values, disc, body, tips[0], tips[1], ends, need)
+    if not len(way):
+        raise NoRobotPath(
+            RobotPathError.NO_PATH,
+            "no way for the robot between start and goal: it needs "
+            f"{2.0 * (robot.footprint_radius + settings.safety_distance):.3f} m",
+        )
+    way = straightened(field.values, disc, body, ends, need, way)
+    points = np.vstack([start[:2], way[1:-1] * field.spacing + field.args[:2], goal[:2]])
     return _drive(points, start, goal, settings)
 
 
-def _grid_path(
-    field: DistanceField, start: Array, goal: Array, circles: Array, wall: float, extra: float
-) -> Array:
-    x0, x1, y0, y1 = field.grid.extent
-    nx, ny = int((x1 - x0) / _CELL), int((y1 - y0) / _CELL)
-    x = x0 + (np.arange(nx) + 0.5) * _CELL
-    y = y0 + (np.arange(ny) + 0.5) * _CELL
-    stride_x = np.clip(((x - x0) / field.grid.resolution).astype(int), 0, None)
-    stride_y = np.clip(((y - y0) / field.grid.resolution).astype(int), 0, None)
-    free = field.values[np.ix_(stride_y, stride_x)] >= wall
-    gx, gy = np.meshgrid(x, y)
-    for cx, cy, radius in circles:
-        free &= np.hypot(gx - cx, gy - cy) >= radius + extra
-    index = np.arange(nx * ny).reshape(ny, nx)
-    rows, columns, weights = [], [], []
-    for dx, dy in ((1, 0), (0, 1), (1, 1), (1, -1), (2, 1), (1, 2), (2, -1), (1, -2)):
-        a = (slice(max(0, -dy), ny - max(0, dy)), slice(0, nx - dx))
-        b = (slice(max(0, dy), ny - max(0, -dy)), slice(dx, nx))
-        both = free[a] & free[b]
-        rows.append(index[a][both])
-        columns.append(index[b][both])
-        weights.append(np.full(int(both.sum()), math.hypot(dx, dy) * _CELL))
-    # Start and goal join the free cells around them.
-    tips = [nx * ny, nx * ny + 1]
-    for tip, pose in zip(tips, (start, goal), strict=True):
-        gap = np.hypot(gx - pose[0], gy - pose[1])
-        near = free & (gap < 3.0 * _CELL)
-        rows.append(np.full(int(near.sum()), tip))
-        columns.append(index[near])
-        weights.append(gap[near] + 1e-9)
-    graph = coo_array(
-        (np.concatenate(weights), (np.concatenate(rows), np.concatenate(columns))),
-        shape=(nx * ny + 2, nx * ny + 2),
-    ).tocsr()
-    distance, before = dijkstra(graph, directed=False, indices=tips[0], return_predecessors=True)
-    if not np.isfinite(distance[tips[1]]):
-        raise NoRobotPath(RobotPathError.NO_PATH, "no way for the robot between start and goal")
-    cells = []
-    cell = before[tips[1]]
-    while cell != tips[0]:
-        cells.append(cell)
-        cell = before[cell]
-    cells.reverse()
-    inner = np.column_stack([gx.ravel()[cells], gy.ravel()[cells]]).reshape(-1, 2)
-    return np.vstack([start[:2], inner, goal[:2]])
+def _relief(
+    field: DistanceField,
+    disc: Array,
+    body: float,
+    tip: Array,
+    room: float,
+    need: float,
+    least: float,
+) -> tuple[float, float]:
+    """Radius about an end, and how much less room there; all in lattice spacings.
 
-
-def _straighten(
-    points: Array, field: DistanceField, circles: Array, wall: float, extra: float
-) -> Array:
-    def clear(a: Array, b: Array) -> bool:
-        if field.segment(a, b, wall) < wall - 1e-9:
-            return False
-        along = b - a
-        for cx, cy, radius in circles:
-            t = np.clip(((cx - a[0]) * along[0] + (cy - a[1]) * along[1]) / (along @ along), 0, 1)
-            if np.hypot(*(a + t * along - (cx, cy))) < radius + extra - 1e-9:
-                return False
-        return True
-
-    kept = [points[0]]
-    i = 0
-    while i < len(points) - 1:
-        j = len(points) - 1
-        while j > i + 1 and not clear(points[i], points[j]):
-            j -= 1
-        kept.append(points[j])
-        i = j
-    return np.array(kept)
+    The robot may stand closer to something than it would like, and comes no closer on the way out.
+    """
+    if room >= need:
+        return 0.0, 0.0
+    # A point that lies between those of the lattice may have more room than any of them.
+    for floor in (room - 1e-9, max(least, room - 0.75)):
+        radius = escape_radius(field.values, disc, body, tip, need, floor)
+        if np.isfinite(radius):
+            return radius, need - floor
+    return 0.0, 0.0
 
 
 def _drive(points: Array, start: Array, goal: Array, settings: PlannerSettings) -> Trajectory:

@@ -91,7 +91,8 @@ def poses_from_ros(
         elif name in poses:
             refused.append(f"{name} stands twice in one frame")
         else:
-            pose[2] = se2.wrap(float(pose[2]))
+            if abs(pose[2]) > math.pi:
+                pose[2] = se2.wrap(float(pose[2]))
             poses[name] = pose
     return poses, refused
 

@@ -1,4 +1,9 @@
-"""Maps in the map_server format: a YAML file and a PGM or PNG image beside it. No ROS here."""
+"""Maps in the map_server format: a YAML file and a PGM or PNG image beside it. No ROS here.
+
+Unknown is wall. What a map's thresholds say of the grey 205 does not matter: it is what map savers
+write for unknown cells, and some of them have written ``free_thresh: 0.25`` beside it, above the
+share of 0.196 that 205 stands for, which would make all that is unknown free.
+"""
 
 import base64
 import math
@@ -18,6 +23,7 @@ from push_model.settings import SettingsError, bounded, from_mapping, settings
 _DATA = "data:image/png;base64,"
 _MODES = ("1", "L", "LA", "P", "RGB", "RGBA")  # of 8 bits a channel
 _MAX_CELLS = 4_000_000
+_UNKNOWN_GREY = 205  # of map savers, in trinary maps
 
 
 @settings
@@ -55,7 +61,8 @@ def is_map(values: Any) -> bool:
 def load_map(values: Any, where: str, folder: Path | None = None) -> MapSpec:
     """The map of parsed YAML.
 
-    Unknown cells count as occupied, and so do the outermost ones: nothing leaves a map.
+    Unknown cells count as occupied, and so do the outermost ones: nothing leaves a map. Transparent
+    pixels are unknown, and in trinary maps the grey 205, whatever ``free_thresh`` says.
 
     Parameters
     ----------
@@ -79,16 +86,10 @@ def load_map(values: Any, where: str, folder: Path | None = None) -> MapSpec:
         source = Path(spec.image)
         if not source.is_absolute() and folder is not None:
             source = folder / source
-    grey, transparent = _pixels(source, where)
-    if spec.mode == "raw":
-        occupied = grey >= 50  # 0-100 is the occupancy itself, more is unknown
-    else:
-        share = grey / 255.0 if spec.negate else 1.0 - grey / 255.0
-        level = spec.free_thresh
-        if spec.mode == "scale":
-            level = 0.5 * (spec.free_thresh + spec.occupied_thresh)
-        occupied = share >= level
-    occupied = (occupied | transparent)[::-1].copy()
+    brightness, transparent = _pixels(source, where)
+    occupied = _occupied_levels(spec)[brightness]
+    occupied |= transparent
+    occupied = occupied[::-1].copy()
     occupied[[0, -1], :] = True
     occupied[:, [0, -1]] = True
     if occupied.all():
@@ -111,8 +112,22 @@ def map_to_mapping(spec: MapSpec) -> dict[str, Any]:
     }
 
 
-def _pixels(path: Path | BytesIO, where: str) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Grey values 0-255 and transparency, both ``(rows, columns)``, the first row on top."""
+def _occupied_levels(spec: MapFile) -> NDArray[np.bool_]:
+    """``(766,)`` whether a cell is occupied or unknown, by the sum of its three colours."""
+    grey = np.arange(766) / 3.0
+    if spec.mode == "raw":
+        return grey >= 50  # 0-100 is the occupancy itself, more is unknown
+    share = grey / 255.0 if spec.negate else 1.0 - grey / 255.0
+    if spec.mode == "scale":
+        return share >= 0.5 * (spec.free_thresh + spec.occupied_thresh)
+    occupied = share >= spec.free_thresh
+    if not spec.negate:
+        occupied[3 * _UNKNOWN_GREY] = True
+    return occupied
+
+
+def _pixels(path: Path | BytesIO, where: str) -> tuple[NDArray[np.uint16], NDArray[np.bool_]]:
+    """Sum of three colours and transparency, both ``(rows, columns)``, the first row on top."""
     try:
         with Image.open(path) as image:
             if image.width * image.height > _MAX_CELLS:
@@ -126,9 +141,12 @@ def _pixels(path: Path | BytesIO, where: str) -> tuple[NDArray[np.float64], NDAr
                 raise SettingsError(
                     f"{where}.image: {path} has pixels of kind {image.mode}; save it with 8 bits"
                 )
-            colour = np.asarray(image.convert("RGBA"), dtype=np.float64)
+            if image.mode == "L":  # as map savers write: no need for four times the memory
+                grey = np.asarray(image, dtype=np.uint16)
+                return 3 * grey, np.zeros(grey.shape, dtype=bool)
+            colour = np.asarray(image.convert("RGBA"))
     except FileNotFoundError:
         raise SettingsError(f"{where}.image: {path} does not exist") from None
     except (OSError, SyntaxError, Image.DecompressionBombError) as error:
         raise SettingsError(f"{where}.image: {path} is no readable image: {error}") from None
-    return colour[:, :, :3].mean(axis=2), colour[:, :, 3] < 128
+    return colour[:, :, :3].sum(axis=2, dtype=np.uint16), colour[:, :, 3] < 128

@@ -1,53 +1,136 @@
-"""Scenario files: environment, robots, objects, goal, settings; by path or name. No ROS here."""
+"""A scenario: environment, robots, objects, teams with goals, events, settings. No ROS here.
 
-import importlib.util
-import math
-import os
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+Poses of robots are of the axle midpoint, poses of objects and goals of the object's geometric frame
+(see ``ObjectSpec``), all in the world frame, in [m, m, rad].
+"""
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import yaml
-
 from push_model.arrays import Array
 from push_model.occupancy import MapSpec, OccupancyGrid, rasterise
-from push_model.settings import SettingsError, from_mapping
+from push_model.settings import SettingsError, bounded, from_mapping, settings
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
+from push_scenario.bodies import placed, read_groups
+from push_scenario.events import Event, check_names
+from push_scenario.files import (
+    config_directory,
+    dump_yaml,
+    find,
+    parse_yaml,
+    read_named,
+    read_yaml,
+    scenario_names,
+)
 from push_scenario.map_file import is_map, load_map, map_to_mapping
+from push_scenario.poses import PoseValue, to_value
+from push_scenario.room import Room
+from push_scenario.start_check import aim_troubles, start_troubles
+from push_scenario.teams import (
+    Team,
+    TeamEntry,
+    TimedPose,
+    aims_to_mapping,
+    check_aims,
+    goals_of,
+    made_teams,
+)
+
+__all__ = [
+    "NODES",
+    "Scenario",
+    "ScenarioFile",
+    "config_directory",
+    "find",
+    "load_scenario",
+    "read_yaml",
+    "scenario_from_mapping",
+    "scenario_from_text",
+    "scenario_names",
+]
 
 NODES = ("bridge", "planner", "controller", "supervisor")
 """Nodes that a scenario may have parameters for."""
 
 
+@settings
+class ScenarioFile:
+    """The keys of a scenario file."""
+
+    environment: Any = bounded(doc="a name in config/environments, a path, or the contents")
+    robots: dict[str, Any] = bounded(doc="name to type and start, or type, count and placement")
+    objects: dict[str, Any] = field(default_factory=dict)
+    goal: PoseValue | None = bounded(None, doc="[x, y, theta] [m, m, rad] of the first object")
+    goals: tuple[PoseValue, ...] = bounded((), doc="several goals, one after another")
+    trajectory: tuple[TimedPose, ...] = bounded((), doc="timed poses instead of goals")
+    teams: dict[str, TeamEntry] = field(default_factory=dict)
+    events: tuple[Event, ...] = bounded((), doc="what happens while it runs")
+    parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        check_aims(self.goal, self.goals, self.trajectory)
+        if self.teams and (self.goal is not None or self.goals or self.trajectory):
+            raise SettingsError("with teams, each has its goals; the scenario has none of its own")
+        if not self.robots:
+            raise SettingsError("robots: at least one robot is needed")
+        for node in self.parameters:
+            if node not in NODES:
+                known = ", ".join(NODES)
+                raise SettingsError(f"parameters: unknown node '{node}'; expected one of: {known}")
+
+
 @dataclass(frozen=True)
 class Scenario:
-    """parameters: node name to a mapping of that node's settings; goal ``(3,)``."""
+    """A scenario with every name resolved and every body placed.
+
+    robots, objects: name to type and start pose ``(3,)``.
+    parameters: node name to a mapping of that node's settings.
+    goals: poses ``(3,)`` one after another, of a scenario without teams; or trajectory.
+    teams: by name; empty when all robots are one team. events: in the order of time.
+    """
 
     name: str
     environment: EnvironmentSpec | MapSpec
     robots: dict[str, tuple[RobotSpec, Array]]
     objects: dict[str, tuple[ObjectSpec, Array]]
-    goal: Array | None
-    parameters: dict[str, dict[str, Any]]
+    parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
+    goals: tuple[Array, ...] = ()
+    trajectory: tuple[TimedPose, ...] = ()
+    teams: dict[str, Team] = field(default_factory=dict)
+    events: tuple[Event, ...] = ()
+
+    @property
+    def goal(self) -> Array | None:
+        """The first goal ``(3,)`` of the first team."""
+        return self.team().goal
 
     @property
     def text(self) -> str:
-        """The scenario as YAML that needs no other file."""
-        environment = (
-            map_to_mapping(self.environment)
+        """The scenario as YAML that needs no other file, every default written out."""
+        values: dict[str, Any] = {
+            "environment": map_to_mapping(self.environment)
             if isinstance(self.environment, MapSpec)
-            else asdict(self.environment)
-        )
-        values = {
-            "environment": environment,
+            else asdict(self.environment),
             "robots": _bodies_to_mapping(self.robots),
             "objects": _bodies_to_mapping(self.objects),
-            "goal": None if self.goal is None else self.goal.tolist(),
-            "parameters": self.parameters,
         }
-        return yaml.safe_dump(values, sort_keys=False)
+        if self.teams:
+            values["teams"] = {
+                team.name: {
+                    "robots": list(team.robots),
+                    "object": team.object,
+                    **aims_to_mapping(team.goals, team.trajectory),
+                }
+                for team in self.teams.values()
+            }
+        else:
+            values.update(aims_to_mapping(self.goals, self.trajectory))
+        values["events"] = [asdict(e) for e in self.events]
+        values["parameters"] = self.parameters
+        return dump_yaml(values)
 
     @property
     def grid(self) -> OccupancyGrid:
@@ -69,12 +152,23 @@ class Scenario:
         """Name and type of an object; of the first when no name is given."""
         return _pick(name, {k: v[0] for k, v in self.objects.items()}, "object")
 
+    def team(self, name: str = "") -> Team:
+        """A team; the first when no name is given.
+
+        Without teams in the file there is one, unnamed: all robots, the first object, the
+        scenario's goals.
+        """
+        if self.teams:
+            name, _ = _pick(name, self.teams, "team")
+            return self.teams[name]
+        if name:
+            raise SettingsError(f"unknown team '{name}'; the scenario has no teams")
+        item = next(iter(self.objects), "")
+        return Team("", tuple(self.robots), item, self.goals, self.trajectory)
+
     def settings(self, node: str, **changes: Any) -> "Scenario":
         """The scenario with some settings of a node replaced; a key may be dotted with ``__``."""
-        values = {
-            k: (dict(v) if isinstance(v, Mapping) else v)
-            for k, v in self.parameters.get(node, {}).items()
-        }
+        values = _copied(self.parameters.get(node, {}))
         for key, value in changes.items():
             *path, last = key.split("__")
             inner = values
@@ -83,60 +177,31 @@ class Scenario:
             inner[last] = value
         return replace(self, parameters={**self.parameters, node: values})
 
+    def with_defaults(self, nodes: Mapping[str, Mapping[str, Any]]) -> "Scenario":
+        """The scenario with the settings of nodes filled in where it is silent.
 
-def _bodies_to_mapping(bodies: Mapping[str, tuple[Any, Array]]) -> dict[str, Any]:
-    return {
-        name: {"type": asdict(spec), "start": start.tolist()}
-        for name, (spec, start) in bodies.items()
-    }
+        Parameters
+        ----------
+        nodes: node name to all of its settings, e.g. ``asdict`` of its settings class. A bag that
+            is recorded with these in its scenario does not change when a default does.
+        """
+        parameters = {n: _filled(self.parameters.get(n, {}), nodes.get(n, {})) for n in NODES}
+        return replace(self, parameters={n: v for n, v in parameters.items() if v})
 
+    def check(self, where: str = "scenario") -> None:
+        """Refuse a scenario that cannot begin.
 
-def _pick(name: str, known: Mapping[str, Any], kind: str) -> tuple[str, Any]:
-    name = name or next(iter(known), "")
-    if name not in known:
-        raise SettingsError(f"unknown {kind} '{name}'; the scenario has: {', '.join(known)}")
-    return name, known[name]
-
-
-def config_directory() -> Path:
-    """Folder of the files in config/; PLANAR_PUSH_CONFIG names another one."""
-    override = os.environ.get("PLANAR_PUSH_CONFIG")
-    if override:
-        return Path(override)
-    beside = Path(__file__).resolve().parent.parent / "config"
-    if beside.is_dir():
-        return beside
-    spec = importlib.util.find_spec("push_config")
-    if spec is not None and spec.submodule_search_locations:
-        return Path(next(iter(spec.submodule_search_locations)))
-    raise SettingsError("no config folder found; set PLANAR_PUSH_CONFIG")
-
-
-def read_yaml(path: Path) -> Any:
-    """The contents of a YAML file; errors name the file."""
-    try:
-        return yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise SettingsError(f"{path}: cannot be read: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise SettingsError(f"{path}: not valid YAML: {error}") from None
-
-
-def find(kind: str, name: str) -> Path:
-    """The file of a name in config/<kind>/, or the path that the name is."""
-    path = Path(name)
-    if path.suffix in (".yaml", ".yml"):
-        return path
-    candidate = config_directory() / kind / f"{name}.yaml"
-    if not candidate.is_file():
-        known = sorted(p.stem for p in candidate.parent.glob("*.yaml"))
-        raise SettingsError(f"no {kind} called '{name}'; known: {', '.join(known)}")
-    return candidate
-
-
-def scenario_names() -> list[str]:
-    """Names in config/scenarios."""
-    return sorted(p.stem for p in (config_directory() / "scenarios").glob("*.yaml"))
+        Raises
+        ------
+        SettingsError: a start pose in a wall, in another body or outside, or a goal in a wall or
+            outside; with the names, a line each.
+        """
+        room = Room(self.environment)
+        teams: Iterable[Team] = self.teams.values() or (self.team(),)
+        found = start_troubles(self.robots, self.objects, room)
+        found += aim_troubles(teams, self.objects, room)
+        if found:
+            raise SettingsError("\n".join(f"{where}: {trouble}" for trouble in found))
 
 
 def load_scenario(name: str) -> Scenario:
@@ -150,100 +215,91 @@ def load_scenario(name: str) -> Scenario:
     return scenario_from_mapping(read_yaml(path), path.stem, str(path), path.parent)
 
 
+def scenario_from_text(text: str, name: str, where: str) -> Scenario:
+    """A scenario from its ``text``, e.g. of a bag; ``where`` names that in errors."""
+    return scenario_from_mapping(parse_yaml(text, where), name, where)
+
+
 def scenario_from_mapping(
     values: Any, name: str, where: str, folder: Path | None = None
 ) -> Scenario:
-    """A scenario from parsed YAML."""
-    keys = {"environment", "robots", "objects", "goal", "parameters"}
+    """A scenario from parsed YAML; paths in it start from ``folder``.
+
+    Raises
+    ------
+    SettingsError: as ``load_scenario``; also what ``Scenario.check`` refuses.
+    """
     if not isinstance(values, Mapping):
         raise SettingsError(f"{where}: expected a mapping, got {values!r}")
-    for key in values:
-        if key not in keys:
-            raise SettingsError(
-                f"{where}: unknown key '{key}'; expected one of: {', '.join(sorted(keys))}"
-            )
-    for key in ("environment", "robots"):
-        if key not in values:
-            raise SettingsError(f"{where}: missing key '{key}'")
-    environment = _environment(values["environment"], f"{where}.environment", folder)
-    robots = _bodies(RobotSpec, "robots", values["robots"], f"{where}.robots", folder)
-    objects = _bodies(
-        ObjectSpec, "objects", values.get("objects") or {}, f"{where}.objects", folder
+    needed = ("environment", "robots")
+    given = {k: v for k, v in values.items() if v is not None or k in needed}
+    file = from_mapping(ScenarioFile, given, where)
+    environment = _environment(file.environment, f"{where}.environment", folder)
+    robots = read_groups(RobotSpec, "robots", file.robots, f"{where}.robots", folder)
+    objects = read_groups(ObjectSpec, "objects", file.objects, f"{where}.objects", folder)
+    _refuse_twice(
+        [n for g in robots for n in g.names], [n for g in objects for n in g.names], where
     )
-    if not robots:
-        raise SettingsError(f"{where}.robots: at least one robot is needed")
-    twice = set(robots) & set(objects)
-    if twice:
-        raise SettingsError(f"{where}: {sorted(twice)} name both a robot and an object")
-    goal = values.get("goal")
-    parameters = values.get("parameters") or {}
-    if not isinstance(parameters, Mapping) or not all(
-        isinstance(v, Mapping) for v in parameters.values()
-    ):
-        raise SettingsError(f"{where}.parameters: expected node names with mappings")
-    for node in parameters:
-        if node not in NODES:
-            raise SettingsError(
-                f"{where}.parameters: unknown node '{node}'; expected one of: {', '.join(NODES)}"
-            )
-    return Scenario(
-        name,
-        environment,
-        robots,
-        objects,
-        None if goal is None else _pose(goal, f"{where}.goal"),
-        {str(k): dict(v) for k, v in parameters.items()},
+    starts = placed(robots, objects, Room(environment))
+    groups = {g.key: g.names for g in robots} | {n: (n,) for g in robots for n in g.names}
+    names = tuple(n for g in objects for n in g.names)
+    check_names(file.events, {n for g in robots for n in g.names}, set(names), f"{where}.events")
+    scenario = Scenario(
+        name=name,
+        environment=environment,
+        robots={n: (g.spec, starts[n]) for g in robots for n in g.names},
+        objects={n: (g.spec, starts[n]) for g in objects for n in g.names},
+        parameters=_copied(file.parameters),
+        goals=goals_of(file.goal, file.goals),
+        trajectory=file.trajectory,
+        teams=made_teams(file.teams, groups, names, f"{where}.teams"),
+        events=tuple(sorted(file.events, key=lambda e: e.at)),
     )
-
-
-def _read(kind: str, value: Any, where: str, folder: Path | None) -> tuple[Any, str, Path | None]:
-    """The YAML that a value names or is, where it stands, and the folder of paths in it."""
-    if not isinstance(value, str):
-        return value, where, folder
-    path = Path(value)
-    if path.suffix not in (".yaml", ".yml"):
-        path = find(kind, value)
-    elif not path.is_absolute() and folder is not None:
-        path = folder / path
-    return read_yaml(path), str(path), path.parent
+    scenario.check(where)
+    return scenario
 
 
 def _environment(value: Any, where: str, folder: Path | None) -> EnvironmentSpec | MapSpec:
-    value, where, folder = _read("environments", value, where, folder)
+    value, where, folder = read_named("environments", value, where, folder)
     if is_map(value):
         return load_map(value, where, folder)
     return from_mapping(EnvironmentSpec, value, where)
 
 
-def _bodies(
-    cls: type[Any], kind: str, values: Any, where: str, folder: Path | None
-) -> dict[str, tuple[Any, Array]]:
-    if not isinstance(values, Mapping):
-        raise SettingsError(f"{where}: expected names with mappings, got {values!r}")
-    result = {}
-    for name, entry in values.items():
-        here = f"{where}.{name}"
-        if not (str(name).isascii() and str(name).isidentifier()):
-            raise SettingsError(f"{here}: a name must be letters, digits and underscores")
-        if not isinstance(entry, Mapping) or not {"type", "start"} <= set(entry):
-            raise SettingsError(f"{here}: expected keys 'type' and 'start', got {entry!r}")
-        overrides = {k: v for k, v in entry.items() if k not in ("type", "start")}
-        spec, source, _ = _read(kind, entry["type"], f"{here}.type", folder)
-        if not isinstance(spec, Mapping):
-            raise SettingsError(f"{source}: expected a name or a mapping, got {spec!r}")
-        result[str(name)] = (
-            from_mapping(cls, {**spec, **overrides}, here if overrides else source),
-            _pose(entry["start"], f"{here}.start"),
-        )
+def _refuse_twice(robots: list[str], objects: list[str], where: str) -> None:
+    twice = sorted(set(robots) & set(objects))
+    if twice:
+        raise SettingsError(f"{where}: {twice} name both a robot and an object")
+    for names in (robots, objects):
+        again = sorted(n for n, count in Counter(names).items() if count > 1)
+        if again:
+            raise SettingsError(f"{where}: {again} are named twice, by a group and on their own")
+
+
+def _bodies_to_mapping(bodies: Mapping[str, tuple[Any, Array]]) -> dict[str, Any]:
+    written: dict[Any, dict[str, Any]] = {}  # a type that many share is written once
+    return {
+        name: {"type": written.setdefault(spec, asdict(spec)), "start": to_value(start)}
+        for name, (spec, start) in bodies.items()
+    }
+
+
+def _pick(name: str, known: Mapping[str, Any], kind: str) -> tuple[str, Any]:
+    name = name or next(iter(known), "")
+    if name not in known:
+        raise SettingsError(f"unknown {kind} '{name}'; the scenario has: {', '.join(known)}")
+    return name, known[name]
+
+
+def _copied(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {k: _copied(v) if isinstance(v, Mapping) else v for k, v in values.items()}
+
+
+def _filled(values: Mapping[str, Any], defaults: Mapping[str, Any]) -> dict[str, Any]:
+    result = _copied(values)
+    for key, default in defaults.items():
+        if isinstance(default, Mapping):
+            result[key] = _filled(result.get(key) or {}, default)
+        else:
+            result.setdefault(key, default)
     return result
-
-
-def _pose(value: Any, where: str) -> Array:
-    if (
-        not isinstance(value, (list, tuple))
-        or len(value) != 3
-        or not all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in value)
-        or not all(math.isfinite(v) for v in value)
-    ):
-        raise SettingsError(f"{where}: expected [x, y, theta] in m and rad, got {value!r}")
-    return np.array(value, dtype=np.float64)

@@ -1,6 +1,7 @@
-"""FAULTS 20: files and parameters that are wrong are refused, and say what was expected."""
+"""FAULTS 20: files that are wrong are refused, and say what was expected."""
 
-from dataclasses import asdict
+import math
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from push_model import SettingsError, from_mapping
+from push_model.bumpers import RingBumper
 from push_model.occupancy import rasterise
 from push_model.specs import ObjectSpec, RobotSpec
 from push_scenario.scenario import (
@@ -58,6 +60,12 @@ def test_every_shipped_type_is_sound(kind, cls):
         ({"goal": [0, 0, "a"]}, ["goal", "[x, y, theta]"]),
         ({"parameters": {"planner": 3}}, ["parameters"]),
         ({"parameters": {"planer": {}}}, ["parameters", "unknown node 'planer'", "planner"]),
+        ({"robots": {"r": {"type": "epuck"}}}, ["robots.r", "'start'", "'placement'"]),
+        ({"robots": {"r": {"type": "epuck", "count": 3}}}, ["robots.r", "'placement'"]),
+        ({"goal": [0, 0, math.inf]}, ["goal", "[x, y, theta]", "inf"]),
+        ({"goal": [0, 0, 0], "goals": [[0, 0, 0]]}, ["one of 'goal', 'goals'"]),
+        ({"events": [{"kind": "quake", "at": 1}]}, ["events[0].kind", "displace", "quake"]),
+        ({"robots": 3, "goal": "x"}, ["s.yaml.robots", "s.yaml.goal"]),
         ({"robots": {"r": {"type": 3, "start": [0, 0, 0], "mass": 1}}}, ["r.type", "3"]),
         ({"robots": {"r\u00f6": {"type": "epuck", "start": [0, 0, 0]}}}, ["letters"]),
         (
@@ -98,8 +106,18 @@ def test_malformed_yaml_names_the_file(tmp_path):
 
 
 def test_overrides_within_a_scenario():
-    values = {**GOOD, "objects": {"b": {"type": "box9", "start": [0, 0, 0], "mass": 0.08}}}
-    assert scenario_from_mapping(values, "s", "s").objects["b"][0].mass == 0.08
+    """Keys beside the type replace the type's; a drive's and a bumper's one by one."""
+    robot = {"type": "epuck", "start": [0, 0, 0], "drive": {"wheel_friction": 0.4}}
+    robot["bumper"] = {"kind": "ring", "radius": 0.06}
+    box = {"type": "box9", "start": [0.3, 0, 0], "mass": 0.08}
+    box["shape"] = {"ellipse": {"semi_axis_x": 0.1, "semi_axis_y": 0.05}}
+    values = {**GOOD, "robots": {"r": robot}, "objects": {"b": box}}
+    scenario = scenario_from_mapping(values, "s", "s")
+    plain = scenario_from_mapping(GOOD, "s", "s")
+    assert scenario.objects["b"][0].mass == 0.08
+    assert scenario.objects["b"][0].geometry.kind == "ellipse"
+    assert scenario.robot()[1].drive == replace(plain.robot()[1].drive, wheel_friction=0.4)
+    assert scenario.robot()[1].bumper == RingBumper(0.06, z=0.0205)
 
 
 @given(
@@ -117,41 +135,6 @@ def test_junk_scenarios_are_refused_not_crashed_on(values):
         scenario_from_mapping({**GOOD, **values}, "s", "s.yaml")
     except SettingsError:
         pass
-
-
-def test_ros_parameters_follow_the_dataclass(ros, scenario):
-    from rclpy.exceptions import ParameterNotDeclaredException
-    from rclpy.parameter import Parameter
-
-    from push_planner.node import PlannerNode
-
-    node = PlannerNode(scenario)
-    try:
-        assert node.get_parameter("push_speed").value == node.settings.push_speed
-        descriptor = node.describe_parameter("push_speed")
-        assert "[m/s]" in descriptor.description
-        assert descriptor.floating_point_range[0].to_value == 2.0
-        (low,) = node.set_parameters([Parameter("push_speed", value=-1.0)])
-        assert not low.successful and node.settings.push_speed > 0
-        (kind,) = node.set_parameters([Parameter("push_speed", value="fast")])
-        assert not kind.successful
-        with pytest.raises(ParameterNotDeclaredException):
-            node.set_parameters([Parameter("warp", value=1.0)])
-        (cross,) = node.set_parameters([Parameter("heading_offsets", value=[0.0, 0.2])])
-        assert cross.successful and node.settings.heading_offsets == (0.0, 0.2)
-        (good,) = node.set_parameters([Parameter("push_speed", value=0.05)])
-        assert good.successful and node.settings.push_speed == 0.05
-    finally:
-        node.destroy_node()
-
-
-def test_unknown_scenario_settings_are_refused(ros, scenario):
-    from push_mpc.node import ControllerNode
-
-    with pytest.raises(SettingsError, match="warp"):
-        ControllerNode(scenario.settings("controller", mpc__warp=3))
-    with pytest.raises(SettingsError, match="horizon"):
-        ControllerNode(scenario.settings("controller", mpc__horizon=-3))
 
 
 def test_grid_marks_walls_and_passage(scenario):

@@ -1,0 +1,124 @@
+"""The robots and objects of a scenario file: their types, and where they start."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from push_model.arrays import Array
+from push_model.settings import SettingsError, bounded, from_mapping, settings
+from push_model.specs import ObjectSpec, RobotSpec
+from push_scenario.files import read_named
+from push_scenario.placements import Placement
+from push_scenario.poses import PoseValue, to_array
+from push_scenario.room import Room, object_footprint, robot_footprint
+
+T = TypeVar("T", RobotSpec, ObjectSpec)
+_ORIGIN = np.zeros(3)
+
+
+@settings
+class BodyEntry:
+    """One body with a start, or a group of them with a count and a placement.
+
+    Further keys replace those of the type; within ``drive`` and ``bumper`` key by key, unless the
+    kind changes.
+    """
+
+    type: Any = bounded(doc="a name in config/, a path, or the type itself")
+    start: PoseValue | None = bounded(None, doc="[x, y, theta] [m, m, rad], world frame")
+    count: int | None = bounded(None, low=1, high=10000, doc="in a group; name1, name2, ...")
+    placement: Placement | None = bounded(None, doc="of a group")
+
+    def __post_init__(self) -> None:
+        if self.start is None and self.count is None and self.placement is None:
+            raise SettingsError("missing key 'start' ([x, y, theta]), or 'count' and 'placement'")
+        if self.start is None and (self.count is None or self.placement is None):
+            raise SettingsError("a group needs both 'count' and 'placement'")
+        if self.start is not None and (self.count is not None or self.placement is not None):
+            raise SettingsError("either 'start' or 'count' and 'placement', not both")
+
+
+@dataclass(frozen=True)
+class Group(Generic[T]):
+    """What one entry of a file stands for: the names in it and their type."""
+
+    key: str
+    names: tuple[str, ...]
+    spec: T
+    entry: BodyEntry
+    where: str
+
+
+def read_groups(
+    cls: type[T], kind: str, values: Mapping[str, Any], where: str, folder: Path | None
+) -> list[Group[T]]:
+    """The entries of ``robots`` or ``objects``.
+
+    Parameters
+    ----------
+    cls: of their types. kind: folder of config/ that has them. values: names with entries.
+
+    Raises
+    ------
+    SettingsError: names file, key, value and what was expected.
+    """
+    own = {f.name for f in fields(BodyEntry)}
+    groups = []
+    for name, values_here in values.items():
+        here = f"{where}.{name}"
+        if not (name.isascii() and name.isidentifier()):
+            raise SettingsError(f"{here}: a name must be letters, digits and underscores")
+        if not isinstance(values_here, Mapping):
+            raise SettingsError(f"{here}: expected a mapping, got {values_here!r}")
+        changes = {k: v for k, v in values_here.items() if k not in own}
+        entry = from_mapping(BodyEntry, {k: v for k, v in values_here.items() if k in own}, here)
+        spec, source, _ = read_named(kind, entry.type, f"{here}.type", folder)
+        if not isinstance(spec, Mapping):
+            raise SettingsError(f"{source}: expected a name or a mapping, got {spec!r}")
+        made = from_mapping(cls, _changed(spec, changes), here if changes else source)
+        count = entry.count
+        names = (name,) if count is None else tuple(f"{name}{i + 1}" for i in range(count))
+        groups.append(Group(name, names, made, entry, here))
+    return groups
+
+
+def placed(
+    robots: list[Group[RobotSpec]], objects: list[Group[ObjectSpec]], room: Room
+) -> dict[str, Array]:
+    """Start pose ``(3,)`` of every name. Groups find their places in the order of the file."""
+    starts: dict[str, Array] = {}
+    circles: list[tuple[float, float, float]] = []
+    waiting: list[tuple[Group[Any], float]] = []
+    sized: list[tuple[Group[Any], float]] = []
+    sized += [(g, robot_footprint("", g.spec, _ORIGIN).radius) for g in robots]
+    sized += [(g, object_footprint("", g.spec, _ORIGIN).radius) for g in objects]
+    for group, radius in sized:
+        if group.entry.start is None:
+            waiting.append((group, radius))
+        else:
+            starts[group.key] = to_array(group.entry.start)
+            circles.append((*group.entry.start[:2], radius))
+    for group, radius in waiting:
+        assert group.entry.placement is not None
+        taken = np.array(circles, dtype=np.float64).reshape(-1, 3)
+        try:
+            poses = group.entry.placement.poses(len(group.names), radius, room, taken)
+        except SettingsError as error:
+            raise SettingsError(f"{group.where}.placement: {error}") from None
+        starts.update(zip(group.names, poses, strict=True))
+        circles += [(float(x), float(y), radius) for x, y, _ in poses]
+    return starts
+
+
+def _changed(spec: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    result = dict(spec)
+    for key, value in changes.items():
+        before = spec.get(key)
+        nested = isinstance(before, Mapping) and isinstance(value, Mapping) and key != "shape"
+        if nested and value.get("kind", before.get("kind")) == before.get("kind"):  # type: ignore[union-attr]
+            value = {**before, **value}  # type: ignore[dict-item]
+        result[key] = value
+    return result

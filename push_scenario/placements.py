@@ -1,0 +1,118 @@
+"""Where the bodies of a group start, told by ``kind``: on a grid, on a ring, at random."""
+
+import math
+from dataclasses import field
+from typing import Annotated, Literal
+
+import numpy as np
+
+from push_model.arrays import Array
+from push_model.se2 import wrap
+from push_model.settings import SettingsError, bounded, settings, told_by_key
+from push_scenario.room import Room
+
+_TRIES = 2000
+"""Places tried for each body of a random placement."""
+
+
+@settings
+class GridPlacement:
+    """Row after row, upward from the lowest."""
+
+    kind: Literal["grid"] = field(default="grid", kw_only=True)
+    corner: tuple[float, float] = bounded(low=-1e4, high=1e4, doc="[m] of the first body")
+    spacing: float = bounded(low=1e-3, high=100.0, doc="[m] between neighbours")
+    columns: int | None = bounded(None, low=1, high=10000, doc="in a row; by default a square")
+    heading: float = bounded(0.0, low=-10.0, high=10.0, doc="[rad]")
+
+    def poses(self, count: int, radius: float, room: Room, taken: Array) -> Array:
+        """``(count, 3)`` poses; see ``RandomPlacement.poses``."""
+        columns = self.columns or math.ceil(math.sqrt(count))
+        row, column = np.divmod(np.arange(count), columns)
+        x, y = self.corner
+        return np.column_stack(
+            [x + self.spacing * column, y + self.spacing * row, np.full(count, self.heading)]
+        )
+
+
+@settings
+class RingPlacement:
+    """Evenly on a circle, counter-clockwise."""
+
+    kind: Literal["ring"] = field(default="ring", kw_only=True)
+    centre: tuple[float, float] = bounded(low=-1e4, high=1e4, doc="[m]")
+    radius: float = bounded(low=1e-3, high=1000.0, doc="[m]")
+    first: float = bounded(0.0, low=-10.0, high=10.0, doc="[rad] where the first one is")
+    facing: Literal["inward", "outward", "along"] = "inward"
+
+    def poses(self, count: int, radius: float, room: Room, taken: Array) -> Array:
+        """``(count, 3)`` poses; see ``RandomPlacement.poses``."""
+        angle = self.first + np.arange(count) * 2.0 * math.pi / count
+        turn = {"inward": math.pi, "outward": 0.0, "along": math.pi / 2.0}[self.facing]
+        x, y = self.centre
+        return np.column_stack(
+            [
+                x + self.radius * np.cos(angle),
+                y + self.radius * np.sin(angle),
+                [wrap(a + turn) for a in angle],
+            ]
+        )
+
+
+@settings
+class RandomPlacement:
+    """Anywhere free, apart from each other and from all that has been placed before."""
+
+    kind: Literal["random"] = field(default="random", kw_only=True)
+    area: tuple[float, float, float, float] | None = bounded(
+        None, low=-1e4, high=1e4, doc="[m] x_min, x_max, y_min, y_max; by default everywhere"
+    )
+    gap: float = bounded(0.01, low=0.0, high=10.0, doc="[m] least distance to anything")
+    heading: float | None = bounded(None, low=-10.0, high=10.0, doc="[rad]; by default random")
+    seed: int = bounded(1, low=0, high=2**62, doc="equal seeds give equal poses")
+
+    def __post_init__(self) -> None:
+        if self.area is not None and not (
+            self.area[0] < self.area[1] and self.area[2] < self.area[3]
+        ):
+            raise SettingsError(f"area: expected x_min < x_max and y_min < y_max, got {self.area}")
+
+    def poses(self, count: int, radius: float, room: Room, taken: Array) -> Array:
+        """``(count, 3)`` poses.
+
+        Parameters
+        ----------
+        radius: [m] of the circle about its pose that holds a body.
+        room: whose walls are kept clear. taken: ``(k, 3)`` [m] circles x, y, radius likewise.
+
+        Raises
+        ------
+        SettingsError: no room found for one of them.
+        """
+        random = np.random.default_rng(self.seed)
+        x0, x1, y0, y1 = self.area or (room.low[0], room.high[0], room.low[1], room.high[1])
+        circles = np.empty((len(taken) + count, 3))
+        circles[: len(taken)] = taken
+        poses = np.empty((count, 3))
+        for i in range(count):
+            known = circles[: len(taken) + i]
+            for _ in range(_TRIES):
+                x, y, theta = random.uniform([x0, y0, -math.pi], [x1, y1, math.pi])
+                away = np.hypot(known[:, 0] - x, known[:, 1] - y) - known[:, 2]
+                if (away >= radius + self.gap).all() and (
+                    room.clearance(np.array([[x, y]]))[0] >= radius + self.gap
+                ):
+                    break
+            else:
+                raise SettingsError(
+                    f"no room found for number {i + 1} of {count} in {_TRIES} tries; "
+                    "expected a larger area, a smaller gap or fewer"
+                )
+            poses[i] = x, y, theta if self.heading is None else self.heading
+            circles[len(taken) + i] = x, y, radius
+        return poses
+
+
+Placement = Annotated[
+    GridPlacement | RingPlacement | RandomPlacement, told_by_key("grid", "ring", "random")
+]

@@ -1,0 +1,120 @@
+"""The controller node among other bodies, driven by a pose stream that integrates its commands."""
+
+import math
+
+import numpy as np
+import pytest
+import rclpy
+import yaml
+from geometry_msgs.msg import TwistStamped
+from rclpy.action import ActionClient
+
+from push_model import line, unicycle_step
+from push_mpc.node import ControllerNode
+from push_msgs.action import FollowTrajectory
+from push_msgs.msg import Poses
+from push_ros.conversions import poses_to_ros, time_from_ros, trajectory_to_ros
+from push_ros.process import Spinner
+from push_ros.qos import COMMAND, STREAM
+from push_scenario.scenario import scenario_from_mapping
+
+WORLD = yaml.safe_load("""
+environment: {size: [3.0, 2.0]}
+robots:
+  me: {type: epuck, start: [-1.0, 0.0, 0.0]}
+  other: {type: epuck, start: [1.0, 0.5, 0.0]}
+objects:
+  box: {type: box9, start: [1.0, -0.5, 0.0]}
+""")
+
+
+class Course:
+    """Unicycles move as commanded; everything else stands where it is put."""
+
+    def __init__(self):
+        self.scenario = scenario_from_mapping(WORLD, "course", "course")
+        self.controller = ControllerNode(self.scenario, "me")
+        self.node = rclpy.create_node("course")
+        self.poses = {
+            "me": np.array([-1.0, 0.0, 0.0]),
+            "other": np.array([1.0, 0.5, 0.0]),
+            "box": np.array([1.0, -0.5, 0.0]),
+        }
+        self.tick, self.answer = 100, None
+        self.publisher = self.node.create_publisher(Poses, "/poses", STREAM)
+        self.node.create_subscription(TwistStamped, "/me/cmd_vel", self.on_command, COMMAND)
+        self.client = ActionClient(self.node, FollowTrajectory, "/me/follow_trajectory")
+        self.spinner = Spinner([self.controller, self.node])
+        ready = lambda: (  # noqa: E731
+            self.client.server_is_ready() and self.publisher.get_subscription_count() > 0
+        )
+        assert self.spinner.until(ready, 15.0)
+
+    def on_command(self, message):
+        self.answer = message
+
+    def step(self):
+        self.tick += 1
+        self.publisher.publish(poses_to_ros(self.poses, self.tick / 100))
+        answered = lambda: (  # noqa: E731
+            self.answer is not None
+            and round(100 * time_from_ros(self.answer.header.stamp)) == self.tick
+        )
+        assert self.spinner.until(answered, 15.0)
+        twist = self.answer.twist
+        self.poses["me"] = unicycle_step(self.poses["me"], twist.linear.x, twist.angular.z, 0.01)
+
+    def gap(self, name):
+        return float(np.hypot(*(self.poses["me"] - self.poses[name])[:2]))
+
+    def follow(self, **fields):
+        way = trajectory_to_ros(line(self.poses["me"], 1.0, 0.1, 0.2))
+        sent = self.client.send_goal_async(FollowTrajectory.Goal(trajectory=way, **fields))
+        assert self.spinner.until(sent.done, 15.0) and sent.result().accepted
+        return sent.result().get_result_async()
+
+
+@pytest.fixture
+def course(ros):
+    course = Course()
+    yield course
+    course.spinner.close()
+
+
+@pytest.mark.parametrize("name", ["other", "box"])
+def test_it_goes_round_or_waits_but_touches_no_other_body(course, name):
+    course.step()
+    result = course.follow()
+    spec, _ = course.scenario.robots["me"]
+    reach = spec.body_radius + course.scenario.radii[name]
+    least = math.inf
+    for tick in range(2400):
+        if tick == 200:  # it walks into the way
+            course.poses[name] = np.array([course.poses["me"][0] + 0.3, 0.01, 0.0])
+        course.step()
+        least = min(least, course.gap(name))
+        if result.done():
+            break
+    assert result.done()
+    assert least > reach - 0.003, (least, reach)
+    assert least < 0.25, "the body was never in the way"
+
+
+def test_the_object_that_is_named_may_be_touched(course):
+    """A retreat or an approach begins or ends at it."""
+    course.poses["box"] = np.array([-0.95, 0.0, 0.0])
+    course.step()
+    result = course.follow(object="box")
+    for _ in range(1500):
+        course.step()
+        if result.done():
+            break
+    assert result.result().result.error_code == FollowTrajectory.Result.NONE
+
+
+def test_an_unknown_object_is_refused(course):
+    way = trajectory_to_ros(line(course.poses["me"], 1.0, 0.1, 0.2))
+    goal = FollowTrajectory.Goal(trajectory=way, object="moon")
+    sent = course.client.send_goal_async(goal)
+    assert course.spinner.until(sent.done, 15.0)
+    assert not sent.result().accepted
