@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from push_model.arrays import Array
+from push_model.arrays import Array, Mask, Rows
 
 _TIME_TOLERANCE = 1e-6  # [s] stamps are in whole nanoseconds
 _SHOWN = 3  # names in a sentence
@@ -36,7 +36,7 @@ class Limits:
 class Admitted:
     """Commands that may be obeyed: rows ``(k,)`` of robots, values ``(k, m)``; and complaints."""
 
-    rows: Array
+    rows: Rows
     values: Array
     refused: list[str]
 
@@ -48,7 +48,7 @@ class CommandGate:
         self.names = tuple(names)
         self.limits = limits
         self._row = {name: row for row, name in enumerate(self.names)}
-        self._asked: tuple[list[str], Array] = ([], np.zeros(0, dtype=np.intp))
+        self._asked: tuple[list[str], Rows] = ([], np.zeros(0, dtype=np.intp))
         self._holonomic = limits.twist[:, 1] > 0.0
         self.restart()
 
@@ -59,7 +59,7 @@ class CommandGate:
         """``(n,)`` whether the robot's last command was to move, and still holds."""
         self._last, self._last_wall = np.zeros(n), np.zeros(n)
 
-    def rows(self, names: Sequence[str]) -> Array:
+    def rows(self, names: Sequence[str]) -> Rows:
         """``(k,)`` the rows of robots, -1 for those that are not known."""
         if names != self._asked[0]:
             row = self._row
@@ -117,7 +117,7 @@ class CommandGate:
         refused += _complain("absurd", [name], absurd, values)
         return self._take(rows, values, good & ~absurd, now, wall, refused)
 
-    def silent(self, now: float, wall: float) -> Array:
+    def silent(self, now: float, wall: float) -> Rows:
         """``(k,)`` rows of robots that drive without a fresh command; they count as stopped."""
         late = now - self._last > self.limits.age + _TIME_TOLERANCE
         late |= wall - self._last_wall > self.limits.wall
@@ -127,11 +127,11 @@ class CommandGate:
         self.driving &= ~late
         return np.flatnonzero(late)
 
-    def stop(self, rows: Array) -> None:
+    def stop(self, rows: Rows) -> None:
         """Note that robots were stopped."""
         self.driving[rows] = False
 
-    def _known(self, names: Sequence[str], stamp: float, now: float) -> tuple[Array, list[str]]:
+    def _known(self, names: Sequence[str], stamp: float, now: float) -> tuple[Rows, list[str]]:
         """Rows of the names, none when the stamp is not a fresh one."""
         age = now - stamp
         fresh = stamp > 0.0 and -_TIME_TOLERANCE <= age <= self.limits.age + _TIME_TOLERANCE
@@ -142,7 +142,7 @@ class CommandGate:
         return self.rows(names), []
 
     def _take(
-        self, rows: Array, values: Array, good: Array, now: float, wall: float, refused: list[str]
+        self, rows: Rows, values: Array, good: Mask, now: float, wall: float, refused: list[str]
     ) -> Admitted:
         if not good.all():
             rows, values = rows[good], values[good]
@@ -151,14 +151,14 @@ class CommandGate:
         return Admitted(rows, values, refused)
 
 
-def _first(rows: Array) -> Array:
+def _first(rows: Rows) -> Mask:
     """Whether each row is known and stands there for the first time."""
     result = np.zeros(len(rows), dtype=bool)
     result[np.unique(rows, return_index=True)[1]] = True
     return result & (rows >= 0)
 
 
-def _complain(why: str, names: Sequence[str], bad: Array, values: Array | None = None) -> list[str]:
+def _complain(why: str, names: Sequence[str], bad: Mask, values: Array | None = None) -> list[str]:
     """One sentence for the bad ones, if there are any."""
     if not bad.any():
         return []

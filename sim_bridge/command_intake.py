@@ -2,13 +2,14 @@
 
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import TwistStamped
 from rclpy.node import Node
 
-from push_model.arrays import Array
+from push_model.arrays import Mask, Rows
 from push_model.drives import HolonomicDrive, TorqueDrive
 from push_model.specs import RobotSpec
 from push_msgs.msg import Velocities, WheelTorques
@@ -33,7 +34,7 @@ class CommandIntake:
         node: Node,
         names: Names,
         diagnostics: Diagnostics,
-        obeyed: Callable[[float, Array], None],
+        obeyed: Callable[[float, Rows], None],
     ) -> None:
         """obeyed: called with the stamp [s] that a command answers and the robots' rows."""
         self._node, self._names, self._diagnostics = node, names, diagnostics
@@ -72,13 +73,13 @@ class CommandIntake:
         for robot, drive in zip(robots, drives, strict=True):
             topic = self._names.robot(robot, "cmd_vel")
             self._subscribe_to(
-                TwistStamped, topic, lambda m, r=robot: self._on_twist(r, m), self._own_inputs
+                TwistStamped, topic, partial(self._on_twist, robot), self._own_inputs
             )
             self._topics.append((topic,))
             if isinstance(drive, TorqueDrive):
                 topic = self._names.robot(robot, "wheel_torques")
                 self._subscribe_to(
-                    WheelTorques, topic, lambda m, r=robot: self._on_torques(r, m), self._own_inputs
+                    WheelTorques, topic, partial(self._on_torques, robot), self._own_inputs
                 )
                 self._topics[-1] += (topic,)
         self.restart()
@@ -99,7 +100,7 @@ class CommandIntake:
         self.gate.restart()
         self._named = np.zeros(len(self.gate.names), dtype=bool)  # on cmd_vels, so far
 
-    def commanded(self) -> Array:
+    def commanded(self) -> Mask:
         """``(n,)`` mask of robots that somebody publishes commands for.
 
         Who is commanded on cmd_vels is known from its first message on; until then it may be
@@ -112,19 +113,19 @@ class CommandIntake:
             own |= self._named if self._named.any() else True
         return own & np.isin(self.gate.names, self._world.names)
 
-    def forget(self, rows: Array) -> None:
+    def forget(self, rows: Rows) -> None:
         """Robots that were waited for in vain are not taken for commanded on cmd_vels any more."""
         self._named[rows] = False
         self.changed = True
 
-    def watch(self, now: float) -> Array:
+    def watch(self, now: float) -> Rows:
         """Stop robots that drive without a fresh command at sim time now [s]; their rows."""
         rows = self.gate.silent(now, time.monotonic())
         if rows.size:
             self.stop(rows)
         return rows
 
-    def stop(self, rows: Array) -> None:
+    def stop(self, rows: Rows) -> None:
         """Command robots to stand."""
         self.gate.stop(rows)
         self._world.command_all([self.gate.names[r] for r in rows], np.zeros((len(rows), 3)))

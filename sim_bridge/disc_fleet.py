@@ -11,11 +11,11 @@ from collections.abc import Mapping
 import numpy as np
 import pybullet as pb
 
-from push_model.arrays import Array
+from push_model.arrays import Array, Rows
 from push_model.drives import HolonomicDrive
 from push_model.limit_surface import GRAVITY
 from push_model.specs import RobotSpec
-from sim_bridge.collision_groups import BODY_GROUP, FLOOR_GROUP
+from sim_bridge.collision_groups import DISC, set_group
 
 _UPRIGHT = 1e3
 """Moment of inertia against tilting, over the one about the vertical."""
@@ -82,9 +82,7 @@ class DiscFleet:
             activationState=pb.ACTIVATION_STATE_DISABLE_SLEEPING,
             physicsClientId=client,
         )
-        pb.setCollisionFilterGroupMask(
-            body, -1, BODY_GROUP, ~FLOOR_GROUP & 0xFF, physicsClientId=client
-        )
+        set_group(client, body, -1, DISC)
         return body
 
     def place(self, index: int, pose: Array) -> None:
@@ -100,7 +98,7 @@ class DiscFleet:
         for array in (self._target, self._before, self._given, self._load):
             array[index] = 0.0
 
-    def command(self, rows: Array, twists: Array, fixed_frame: bool) -> None:
+    def command(self, rows: Rows, twists: Array, fixed_frame: bool) -> None:
         """Set the twists ``(k, 3)`` of some rows, scaled down to what each can do."""
         need = np.maximum(
             np.hypot(twists[:, 0], twists[:, 1]) / self._max_speed[rows],

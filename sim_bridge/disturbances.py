@@ -1,34 +1,17 @@
-"""What happens to a scenario's bodies at given times: moved, killed, removed, unseen.
-
-The events are those of a scenario; they are told apart by their ``kind``.
-"""
+"""What happens to a scenario's bodies at given times: moved, killed, removed, unseen."""
 
 from collections.abc import Sequence
-from typing import Any, Protocol
 
 import numpy as np
 
 from push_model import se2
 from push_model.arrays import Array
 from push_model.settings import SettingsError
+from push_scenario.events import Displace, Event, Kill, Place, Remove
 from sim_bridge.motion_capture import MotionCapture
 from sim_bridge.world import World
 
-_LATE = 1e-9  # [s] by which a time of a tick may fall short
-
-
-class Event(Protocol):
-    """What every event has: its kind, and when it happens, [s] of sim time."""
-
-    @property
-    def kind(self) -> str:
-        """displace, place, kill, remove or drop_poses."""
-        ...
-
-    @property
-    def at(self) -> float:
-        """[s] of sim time."""
-        ...
+_LATE = 1e-9  # [s] by which the time of a tick may fall short
 
 
 class Disturbances:
@@ -55,21 +38,21 @@ class Disturbances:
             done.append(self._carry_out(event, tick, world, capture))
         return done
 
-    def _carry_out(self, event: Any, tick: int, world: World, capture: MotionCapture) -> str:
-        if event.kind == "displace":
-            return displace(world, event.body, world.poses()[event.body] + np.array(event.by))
-        if event.kind == "place":
-            return displace(world, event.body, np.array(event.pose, dtype=np.float64))
-        if event.kind == "kill":
+    def _carry_out(self, event: Event, tick: int, world: World, capture: MotionCapture) -> str:
+        if isinstance(event, Kill):
             world.kill(event.robot)
             return f"{event.robot} obeys no more"
-        if event.kind == "remove":
+        if isinstance(event, Remove):
             world.remove(event.robot)
             return f"{event.robot} is gone"
-        if event.kind == "drop_poses":
-            capture.hide(event.bodies, tick + round(event.duration * self._rate))
-            return f"{', '.join(event.bodies)} unseen for {event.duration:g} s"
-        raise SettingsError(f"the world knows no event '{event.kind}'")
+        if isinstance(event, Displace | Place):
+            if event.body not in world.names:
+                return f"{event.body} is gone and cannot be moved"
+            if isinstance(event, Place):
+                return displace(world, event.body, np.array(event.pose, dtype=np.float64))
+            return displace(world, event.body, world.poses()[event.body] + np.array(event.by))
+        capture.hide(event.bodies, tick + round(event.duration * self._rate) + 1)
+        return f"{', '.join(event.bodies)} unseen for {event.duration:g} s"
 
 
 def displace(world: World, name: str, pose: Array) -> str:

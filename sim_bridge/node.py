@@ -9,7 +9,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from std_srvs.srv import SetBool
 
-from push_model.arrays import Array
+from push_model.arrays import Rows
 from push_model.se2 import compose, pose
 from push_model.settings import SettingsError
 from push_msgs.srv import Displace, LoadScenario, Reset
@@ -90,7 +90,7 @@ class BridgeNode(Node):
         self.world = self._kind.make(s.environment, s.robots, s.objects, self._physics, self.period)
         self._steps = steps_of(self.period, self.world.time_step)
         self._capture = MotionCapture(self._capture_settings, self._seed)
-        self._disturbances = Disturbances(getattr(s, "events", ()), self._rate)
+        self._disturbances = Disturbances(s.events, self._rate)
         self.outputs.scenario(s)
         late = self._capture.delay * self.period
         wall = math.inf if self.settings.lockstep else self.settings.command_timeout_wall
@@ -111,13 +111,13 @@ class BridgeNode(Node):
     @property
     def time(self) -> float:
         """[s] sim time."""
-        return self.tick / self._rate
+        return float(self.tick / self._rate)
 
     def commanded(self) -> list[str]:
         """Robots that somebody publishes commands for."""
         return self._named(np.flatnonzero(self._intake.commanded()))
 
-    def _named(self, rows: Array) -> list[str]:
+    def _named(self, rows: Rows) -> list[str]:
         return [self._intake.gate.names[row] for row in rows]
 
     def heard_by(self, count: int) -> bool:
@@ -169,7 +169,7 @@ class BridgeNode(Node):
             if not self._lockstep.ready or not self._commanded.any():
                 return
 
-    def _on_obeyed(self, stamp: float, rows: Array) -> None:
+    def _on_obeyed(self, stamp: float, rows: Rows) -> None:
         """Robots were commanded in answer to the poses of a stamp [s]."""
         if not (self.settings.lockstep and self.running):
             return

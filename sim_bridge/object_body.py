@@ -14,7 +14,7 @@ import pybullet as pb
 from push_model.arrays import Array
 from push_model.limit_surface import uniform_pressure_radius
 from push_model.specs import ObjectSpec
-from sim_bridge.collision_groups import BODY_GROUP, FLOOR_GROUP
+from sim_bridge.collision_groups import BODY, SUPPORT, set_group
 from sim_bridge.convex_parts import convex_parts, inset
 
 _CLEARANCE = 0.003  # [m] of the body above the floor
@@ -91,9 +91,7 @@ class ObjectBody:
                     contactDamping=feet.damping,
                     physicsClientId=client,
                 )
-                pb.setCollisionFilterGroupMask(
-                    self.body, link, BODY_GROUP, FLOOR_GROUP, physicsClientId=client
-                )
+            set_group(client, self.body, link, SUPPORT if is_foot else BODY)
             applied = pb.getDynamicsInfo(self.body, link, physicsClientId=client)[1]
             if abs(applied - friction) > 1e-9:
                 raise RuntimeError(f"friction {friction} was not applied to link {link}: {applied}")

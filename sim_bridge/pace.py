@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from push_model.arrays import Array
+from push_model.arrays import Mask, Rows
 
 
 class Lockstep:
@@ -17,7 +17,7 @@ class Lockstep:
         self.ready = True
         """Whether nobody is waited for."""
 
-    def expect(self, frame: int, robots: Array, now: float) -> None:
+    def expect(self, frame: int, robots: Mask, now: float) -> None:
         """A frame (tick number) was published at monotonic time now [s]; robots must answer it.
 
         robots: ``(n,)`` mask.
@@ -26,17 +26,17 @@ class Lockstep:
         self._waiting = robots.copy()
         self.ready = not robots.any()
 
-    def answer(self, frame: int, rows: Array) -> None:
+    def answer(self, frame: int, rows: Rows) -> None:
         """Robots answered a frame."""
         if frame == self._frame:
             self.release(rows)
 
-    def release(self, rows: Array) -> None:
+    def release(self, rows: Rows) -> None:
         """Wait no longer for robots."""
         self._waiting[rows] = False
         self.ready = not self._waiting.any()
 
-    def overdue(self, now: float, limit: float) -> Array:
+    def overdue(self, now: float, limit: float) -> Rows:
         """``(k,)`` rows of robots that have not answered for longer than limit [s]."""
         late = now - self._since > limit
         return np.flatnonzero(self._waiting) if late else np.zeros(0, dtype=np.intp)

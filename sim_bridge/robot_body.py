@@ -9,13 +9,13 @@ import pybullet as pb
 
 from push_model.arrays import Array
 from push_model.specs import RobotSpec
-from sim_bridge.collision_groups import BODY_GROUP, FLOOR_GROUP
+from sim_bridge.collision_groups import BODY, SUPPORT, set_group
 from sim_bridge.wheeled_urdf import COM_HEIGHT, Wheels, wheeled_urdf
 from sim_bridge.world import WheelState
 
 WHEELS = (0, 1)
 """Link and joint indices of the left and the right wheel."""
-BODY = -1
+_BASE = -1
 
 
 class RobotBody(Protocol):
@@ -64,7 +64,7 @@ class WheeledBody:
                 flags=pb.URDF_USE_IMPLICIT_CYLINDER,
             )
         for link in range(-1, pb.getNumJoints(self.body, physicsClientId=client)):
-            mu = 1.0 if link == BODY else friction if link in WHEELS else 0.0
+            mu = 1.0 if link == _BASE else friction if link in WHEELS else 0.0
             pb.changeDynamics(self.body, link, lateralFriction=mu, physicsClientId=client)
             pb.changeDynamics(
                 self.body,
@@ -77,10 +77,7 @@ class WheeledBody:
                 jointDamping=0.0,
                 physicsClientId=client,
             )
-            if link != BODY:
-                pb.setCollisionFilterGroupMask(
-                    self.body, link, BODY_GROUP, FLOOR_GROUP, physicsClientId=client
-                )
+            set_group(client, self.body, link, BODY if link == _BASE else SUPPORT)
 
     def put(self, pose: Array) -> None:
         """Put the axle midpoint at a pose ``(3,)``, at rest."""

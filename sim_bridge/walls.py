@@ -7,7 +7,7 @@ import pybullet as pb
 
 from push_model.occupancy import MapSpec
 from push_model.specs import EnvironmentSpec
-from sim_bridge.collision_groups import BODY_GROUP, FLOOR_GROUP
+from sim_bridge.collision_groups import FLOOR, WALL, set_group
 
 _THICKNESS = 0.1  # [m] of the walls about an arena
 
@@ -25,9 +25,7 @@ class Walls:
         self.names: dict[int, str] = {}
         plane = pb.createCollisionShape(pb.GEOM_PLANE, physicsClientId=client)
         self.floor = self._static("floor", plane, 0.0, 0.0, 0.0, 0.0, 1.0)
-        pb.setCollisionFilterGroupMask(
-            self.floor, -1, FLOOR_GROUP, BODY_GROUP, physicsClientId=client
-        )
+        set_group(client, self.floor, -1, FLOOR)
         if isinstance(environment, MapSpec):
             x0, x1, y0, y1 = environment.grid.rectangles().T
             boxes = np.column_stack([x0 + x1, y0 + y1, 2 * (x1 - x0), 2 * (y1 - y0), 0 * x0]) / 2
@@ -52,7 +50,8 @@ class Walls:
         return body
 
     def _wall(self, name: str, shape: int, x: float, y: float, z: float, yaw: float) -> None:
-        self._static(name, shape, x, y, z, yaw, self._friction)
+        body = self._static(name, shape, x, y, z, yaw, self._friction)
+        set_group(self._client, body, -1, WALL)
 
     def _build_boxes(self, boxes: Sequence[tuple[float, ...]]) -> None:
         """Boxes of x, y, length, width, yaw, as high as walls are."""

@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from push_model.arrays import Array
+from push_model.arrays import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class BodyPoses(Mapping[str, Array]):
     def __len__(self) -> int:
         return len(self.names)
 
-    def only(self, keep: Array) -> "BodyPoses":
+    def only(self, keep: Mask) -> "BodyPoses":
         """Those of a mask ``(n,)``."""
         if keep.all():
             return self

@@ -24,7 +24,9 @@ def test_noise_has_the_given_spread_and_comes_from_the_seed():
 
 def test_latency_delays_publication_not_the_stamp():
     capture = MotionCapture(MotionCaptureSettings(latency=0.03), 1)
-    frames = [capture.observe(k, BodyPoses(("a",), np.full((1, 3), float(k)))) for k in range(1, 10)]
+    frames = [
+        capture.observe(k, BodyPoses(("a",), np.full((1, 3), float(k)))) for k in range(1, 10)
+    ]
     assert frames[:3] == [None] * 3
     for k, frame in enumerate(frames[3:], start=1):
         assert frame.stamp == k and frame.poses["a"][0] == k
