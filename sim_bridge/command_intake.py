@@ -43,6 +43,8 @@ class CommandIntake:
         """[s] Sim time."""
         self.changed = False
         """Whether commanded() may have changed since it was asked."""
+        self.unseen: Rows = np.zeros(0, dtype=np.intp)
+        """Robots that the newest frame has not: who answers it for many cannot name them."""
         self._inputs: list[Any] = []
         self._watched: set[str] = set()
         self._many = names.world("cmd_vels")
@@ -118,9 +120,18 @@ class CommandIntake:
         self._named[rows] = False
         self.changed = True
 
+    def note_seen(self, names: tuple[str, ...]) -> None:
+        """Tell the bodies in the newest frame."""
+        here = self._world.names
+        if len(names) == len(here):
+            self.unseen = np.zeros(0, dtype=np.intp)
+        else:
+            robots = set(self.gate.names) & set(here) - set(names)
+            self.unseen = self.gate.rows(sorted(robots))
+
     def watch(self, now: float) -> Rows:
         """Stop robots that drive without a fresh command at sim time now [s]; their rows."""
-        rows = self.gate.silent(now, time.monotonic())
+        rows: Rows = self.gate.silent(now, time.monotonic())
         if rows.size:
             self.stop(rows)
         return rows
@@ -180,7 +191,8 @@ class CommandIntake:
             if not self._named[admitted.rows].all():
                 self._named[admitted.rows] = True
                 self.changed = True
-            self._obeyed(stamp, admitted.rows)
+            blind = self.unseen[self._named[self.unseen]]
+            self._obeyed(stamp, np.append(admitted.rows, blind) if blind.size else admitted.rows)
 
     def _admitted(self, topic: str, admitted: Admitted) -> bool:
         for reason in admitted.refused:

@@ -54,9 +54,10 @@ class DiscFleet:
             r: pb.createCollisionShape(pb.GEOM_SPHERE, radius=r, physicsClientId=client)
             for r in sorted({float(r) for r in radius})
         }
+        starts = [[*start[:2].tolist(), s.bumper_z] for s, _, start in robots.values()]
         self.bodies = [
-            self._make(shapes[float(r)], float(m), float(i))
-            for r, m, i in zip(radius, self._mass, inertia, strict=True)
+            self._make(shapes[float(r)], float(m), float(i), start)
+            for r, m, i, start in zip(radius, self._mass, inertia, starts, strict=True)
         ]
         n = len(self.bodies)
         self._target = np.zeros((n, 3))
@@ -66,9 +67,10 @@ class DiscFleet:
         for i, (_, _, start) in enumerate(robots.values()):
             self.place(i, start)
 
-    def _make(self, shape: int, mass: float, inertia: float) -> int:
+    def _make(self, shape: int, mass: float, inertia: float, start: list[float]) -> int:
+        """Made where it starts: a thousand in one place would all be neighbours."""
         client = self._client
-        body: int = pb.createMultiBody(mass, shape, physicsClientId=client)
+        body: int = pb.createMultiBody(mass, shape, basePosition=start, physicsClientId=client)
         pb.changeDynamics(body, -1, lateralFriction=1.0, physicsClientId=client)
         pb.changeDynamics(
             body,

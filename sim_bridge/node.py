@@ -203,6 +203,7 @@ class BridgeNode(Node):
         if frame is None:
             return None
         measured = frame.stamp / self._rate
+        self._intake.note_seen(frame.poses.names)
         outputs.seen(frame, measured)
         if self.tick % self._decimation == 0:
             outputs.look(self._scenario, frame, self.tick // self._decimation, measured)

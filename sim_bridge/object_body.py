@@ -12,13 +12,14 @@ import numpy as np
 import pybullet as pb
 
 from push_model.arrays import Array
-from push_model.limit_surface import uniform_pressure_radius
+from push_model.limit_surface import GRAVITY, uniform_pressure_radius
 from push_model.specs import ObjectSpec
 from sim_bridge.collision_groups import BODY, SUPPORT, set_group
 from sim_bridge.convex_parts import convex_parts, inset
 
 _CLEARANCE = 0.003  # [m] of the body above the floor
 _FOOT_RADIUS = 0.005  # [m]
+_SINKING = 5e-4  # [m] that feet give way under the object's weight, at most
 _HULL_MARGIN = 0.001  # [m] by which PyBullet lets a convex hull stick out
 
 
@@ -28,6 +29,12 @@ class Feet:
 
     stiffness: float
     damping: float
+
+    def under(self, spec: ObjectSpec) -> "Feet":
+        """Stiffer ones where the object is so heavy that its bottom would touch the floor."""
+        sinking = spec.mass * GRAVITY / (spec.feet * self.stiffness)
+        factor = max(1.0, sinking / _SINKING)
+        return Feet(factor * self.stiffness, factor * self.damping)
 
 
 class ObjectBody:
@@ -67,6 +74,7 @@ class ObjectBody:
             linkJointAxis=[[0, 0, 1]] * links,
             physicsClientId=client,
         )
+        feet = feet.under(spec)
         inertia = self._base_inertia(n, link_mass, radius)
         for link in range(-1, links):
             is_foot = 0 <= link < n
