@@ -49,6 +49,7 @@ class CommandGate:
         self.limits = limits
         self._row = {name: row for row, name in enumerate(self.names)}
         self._asked: tuple[list[str], Rows] = ([], np.zeros(0, dtype=np.intp))
+        self._distinct = True  # whether those asked last are known, each named once
         self._holonomic = limits.twist[:, 1] > 0.0
         self.restart()
 
@@ -65,6 +66,7 @@ class CommandGate:
             row = self._row
             found = np.array([row.get(n, -1) for n in names], dtype=np.intp)
             self._asked = (list(names), found)
+            self._distinct = bool((found >= 0).all()) and len(set(names)) == len(names)
         return self._asked[1]
 
     def admit(
@@ -84,8 +86,12 @@ class CommandGate:
         rows, refused = self._known(names, stamp, now)
         if not rows.size:
             return Admitted(rows, np.zeros((0, 3)), refused)
+        # the usual case first; a NaN is not within limits either
+        within = (np.abs(twists) <= self.limits.twist[rows]).all()
+        if self._distinct and within and (not fixed_frame or self._holonomic[rows].all()):
+            return self._take(rows, twists, None, now, wall, refused)
         good = rows >= 0
-        if not good.all() or len(set(names)) < len(names):
+        if not self._distinct:
             refused += _complain("unknown or named twice", names, ~(good & _first(rows)))
             good &= _first(rows)
         if fixed_frame:
@@ -142,9 +148,15 @@ class CommandGate:
         return self.rows(names), []
 
     def _take(
-        self, rows: Rows, values: Array, good: Mask, now: float, wall: float, refused: list[str]
+        self,
+        rows: Rows,
+        values: Array,
+        good: Mask | None,
+        now: float,
+        wall: float,
+        refused: list[str],
     ) -> Admitted:
-        if not good.all():
+        if good is not None:
             rows, values = rows[good], values[good]
         self.driving[rows] = (values != 0.0).any(axis=1)
         self._last[rows], self._last_wall[rows] = now, wall
