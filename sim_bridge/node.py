@@ -58,7 +58,8 @@ class BridgeNode(Node):
         self._physics = declare_settings(
             self, self._kind.settings, physics, "physics", "bridge.physics"
         )
-        refuse_second_bridge(self, self._names, self.settings.discovery_time if autostart else 0.0)
+        if autostart:
+            refuse_second_bridge(self, self._names, self.settings.discovery_time)
         self._rate = self._capture_settings.rate
         self.period = 1.0 / self._rate
         self._decimation = max(1, round(self._rate / self.settings.tf_rate))

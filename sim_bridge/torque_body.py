@@ -24,9 +24,24 @@ class TorqueBody(WheeledBody):
             drive.wheel_radius, drive.half_track, drive.wheel_mass, (drive.wheel_inertia, across)
         )
         super().__init__(client, spec, wheels, drive.wheel_friction)
+        self._set_inertia(spec, wheels)
         self._torques: tuple[float, float] | None = None
         self._applied = (0.0, 0.0)
         self.place(start)
+
+    def _set_inertia(self, spec: RobotSpec, wheels: Wheels) -> None:
+        """PyBullet takes inertias from the shapes; under torques it is those given that count."""
+        along, across = wheels.inertia
+        for wheel in WHEELS:
+            self._inertia(wheel, [across, along, across])
+        if spec.inertia is not None:
+            ixx, iyy, _ = pb.getDynamicsInfo(self.body, -1, physicsClientId=self._client)[2]
+            self._inertia(-1, [ixx, iyy, spec.inertia])
+
+    def _inertia(self, link: int, diagonal: list[float]) -> None:
+        pb.changeDynamics(
+            self.body, link, localInertiaDiagonal=diagonal, physicsClientId=self._client
+        )
 
     def place(self, pose: Array) -> None:
         """Put the axle midpoint at a pose ``(3,)``, at rest."""
