@@ -10,14 +10,14 @@ from benchmarks.measure import at_least, at_most
 from push_model import se2, uniform_pressure_radius
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
 from push_scenario.scenario import load_scenario
-from sim_bridge.world import World
+from sim_bridge.pybullet_world import PyBulletWorld
 
 OPEN = EnvironmentSpec((8.0, 8.0), resolution=0.02)
 
 
 def deceleration(item: ObjectSpec, yaw: float, direction: float) -> np.ndarray:
     """[m/s^2], [rad/s^2] change of a sliding object's twist, over mu g; and its drift aside."""
-    with World(OPEN, {}, {"b": (item, np.array([0.0, 0.0, yaw]))}) as world:
+    with PyBulletWorld(OPEN, {}, {"b": (item, np.array([0.0, 0.0, yaw]))}) as world:
         world.step(300)
         world.set_velocity("b", 0.3 * np.array([math.cos(direction), math.sin(direction), 0.0]))
         world.step(10)
@@ -31,7 +31,7 @@ def deceleration(item: ObjectSpec, yaw: float, direction: float) -> np.ndarray:
 
 def spin(item: ObjectSpec, yaw: float) -> float:
     """Pure-spin torque over the uniform-pressure value."""
-    with World(OPEN, {}, {"b": (item, np.array([0.0, 0.0, yaw]))}) as world:
+    with PyBulletWorld(OPEN, {}, {"b": (item, np.array([0.0, 0.0, yaw]))}) as world:
         world.step(300)
         world.set_velocity("b", np.array([0.0, 0.0, 6.0]))
         world.step(10)
@@ -48,7 +48,7 @@ def arc_slip(robot: RobotSpec, item: ObjectSpec, mu: float, factor: float, turn:
     radius = (distance + robot.bumper.distance) / mu * factor
     spec, speed = replace(item, contact_friction=mu), 0.05
     ahead = np.array([robot.bumper.distance + distance + 0.0005, 0.0, 0.0])
-    with World(OPEN, {"r": (robot, np.zeros(3))}, {"b": (spec, ahead)}) as world:
+    with PyBulletWorld(OPEN, {"r": (robot, np.zeros(3))}, {"b": (spec, ahead)}) as world:
         for i in range(31):
             world.command("r", speed * i / 30, 0.0)
             world.step(10)
@@ -68,7 +68,7 @@ def arc_slip(robot: RobotSpec, item: ObjectSpec, mu: float, factor: float, turn:
 def straight_slip(robot: RobotSpec, item: ObjectSpec) -> float:
     """[mm] slip along the bumper over 1 m."""
     ahead = np.array([robot.bumper.distance + 0.0455, 0.0, 0.0])
-    with World(OPEN, {"r": (robot, np.zeros(3))}, {"b": (item, ahead)}) as world:
+    with PyBulletWorld(OPEN, {"r": (robot, np.zeros(3))}, {"b": (item, ahead)}) as world:
         for i in range(31):
             world.command("r", 0.08 * i / 30, 0.0)
             world.step(10)
@@ -82,7 +82,7 @@ def straight_slip(robot: RobotSpec, item: ObjectSpec) -> float:
 
 def wheels(robot: RobotSpec) -> tuple[float, float]:
     """Relative error of distance and yaw of wheel commands."""
-    with World(OPEN, {"r": (robot, np.array([0.0, 0.0, 0.3]))}, {}) as world:
+    with PyBulletWorld(OPEN, {"r": (robot, np.array([0.0, 0.0, 0.3]))}, {}) as world:
         world.command("r", 0.1, 0.0)
         world.step(200)
         before = world.poses()["r"]

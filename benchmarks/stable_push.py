@@ -15,7 +15,7 @@ from benchmarks.measure import at_least, at_most
 from push_model import contact_on_side, curvature_limits, se2
 from push_model.specs import EnvironmentSpec, ObjectSpec
 from push_scenario.scenario import load_scenario
-from sim_bridge.world import World
+from sim_bridge.pybullet_world import PyBulletWorld
 
 INSIDE, OUTSIDE = 0.92, 1.15  # of the limiting curvature
 POLYGONS: dict[str, list[list[float]]] = {
@@ -38,7 +38,7 @@ def slip(task: tuple[str, int, float, float, float]) -> float:
     grasp = contact.object_pose + [robot.bumper.distance + 0.0008, 0.0, 0.0]
     environment = EnvironmentSpec((6.0, 6.0), resolution=0.05)
     speed = 0.04
-    with World(environment, {"r": (robot, np.zeros(3))}, {"b": (item, grasp)}) as world:
+    with PyBulletWorld(environment, {"r": (robot, np.zeros(3))}, {"b": (item, grasp)}) as world:
         for i in range(31):
             world.command("r", speed * i / 30, 0.0)
             world.step(10)

@@ -55,10 +55,15 @@ def pose_stamped_to_ros(pose: Array, seconds: float) -> PoseStamped:
 
 def poses_to_ros(poses: Mapping[str, Array], seconds: float) -> Poses:
     """A frame of poses ``(3,)`` by name, measured at a time [s]."""
-    message = Poses(names=list(poses))
+    table = np.array(list(poses.values()), dtype=np.float64).reshape(-1, 3)
+    return frame_to_ros(list(poses), table, seconds)
+
+
+def frame_to_ros(names: Sequence[str], table: Array, seconds: float) -> Poses:
+    """A frame of named poses ``(n, 3)``, measured at a time [s]."""
+    message = Poses(names=list(names))
     message.header.frame_id = FRAME
     message.header.stamp = time_to_ros(seconds)
-    table = np.array(list(poses.values()), dtype=np.float64).reshape(-1, 3)
     message.x, message.y, message.theta = (_doubles(column) for column in table.T)
     return message
 

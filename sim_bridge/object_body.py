@@ -1,8 +1,8 @@
 """A pushed object as a PyBullet body that stands on soft feet.
 
 A flat bottom in PyBullet has a friction that depends on its orientation. Soft spherical feet on a
-circle whose radius equals the torque-to-force ratio of uniform pressure carry equal loads and give
-the friction of Coulomb's law in every direction.
+circle about the centre of mass, whose radius equals the torque-to-force ratio of uniform pressure,
+carry equal loads and give the friction of Coulomb's law in every direction.
 """
 
 import math
@@ -12,13 +12,14 @@ import numpy as np
 import pybullet as pb
 
 from push_model.arrays import Array
-from push_model.limit_surface import uniform_pressure_radius
-from push_model.shapes import Shape
+from push_model.limit_surface import GRAVITY, uniform_pressure_radius
 from push_model.specs import ObjectSpec
-from sim_bridge.collision_groups import BODY_GROUP, FLOOR_GROUP
+from sim_bridge.collision_groups import BODY, SUPPORT, set_group
+from sim_bridge.convex_parts import convex_parts, inset
 
 _CLEARANCE = 0.003  # [m] of the body above the floor
 _FOOT_RADIUS = 0.005  # [m]
+_SINKING = 5e-4  # [m] that feet give way under the object's weight, at most
 _HULL_MARGIN = 0.001  # [m] by which PyBullet lets a convex hull stick out
 
 
@@ -29,16 +30,24 @@ class Feet:
     stiffness: float
     damping: float
 
+    def under(self, spec: ObjectSpec) -> "Feet":
+        """Stiffer ones where the object is so heavy that its bottom would touch the floor."""
+        sinking = spec.mass * GRAVITY / (spec.feet * self.stiffness)
+        factor = max(1.0, sinking / _SINKING)
+        return Feet(factor * self.stiffness, factor * self.damping)
+
 
 class ObjectBody:
-    """One object in one PyBullet world."""
+    """One object in one PyBullet world. The frame of its base is at the centre of mass."""
 
     def __init__(self, client: int, spec: ObjectSpec, feet: Feet, start: Array) -> None:
         self.spec = spec
         self._client = client
+        self.centre = spec.com
+        """[m] The centre of mass in the frame that poses are of, the geometric one."""
         shape = spec.geometry
         height = spec.height - _CLEARANCE
-        hulls = _hulls(client, shape, height)
+        hulls = _hulls(client, spec, height)
         n, radius = spec.feet, uniform_pressure_radius(shape)
         angle = (np.arange(n) + 0.5) * 2.0 * math.pi / n
         foot = pb.createCollisionShape(pb.GEOM_SPHERE, radius=_FOOT_RADIUS, physicsClientId=client)
@@ -65,11 +74,10 @@ class ObjectBody:
             linkJointAxis=[[0, 0, 1]] * links,
             physicsClientId=client,
         )
-        self.side_links = [-1] if len(hulls) == 1 else list(range(n, links))
-        self.foot_links = list(range(n))
-        inertia = self._base_inertia(shape, links, n, link_mass, radius)
+        feet = feet.under(spec)
+        inertia = self._base_inertia(n, link_mass, radius)
         for link in range(-1, links):
-            is_foot = link in self.foot_links
+            is_foot = 0 <= link < n
             friction = spec.floor_friction if is_foot else spec.contact_friction
             # Friction and damping in one call leave the friction of a link unset.
             pb.changeDynamics(self.body, link, lateralFriction=friction, physicsClientId=client)
@@ -91,83 +99,51 @@ class ObjectBody:
                     contactDamping=feet.damping,
                     physicsClientId=client,
                 )
-                pb.setCollisionFilterGroupMask(
-                    self.body, link, BODY_GROUP, FLOOR_GROUP, physicsClientId=client
-                )
+            set_group(client, self.body, link, SUPPORT if is_foot else BODY)
             applied = pb.getDynamicsInfo(self.body, link, physicsClientId=client)[1]
             if abs(applied - friction) > 1e-9:
                 raise RuntimeError(f"friction {friction} was not applied to link {link}: {applied}")
         pb.changeDynamics(self.body, -1, localInertiaDiagonal=inertia, physicsClientId=client)
         self.place(start)
 
-    def _base_inertia(
-        self, shape: Shape, links: int, feet: int, link_mass: float, radius: float
-    ) -> list[float]:
-        m, h = self.spec.mass, self.spec.height
-        total = m * shape.inertia_per_mass
+    def _base_inertia(self, feet: int, link_mass: float, radius: float) -> list[float]:
+        m, h, total = self.spec.mass, self.spec.height, self.spec.moment
         izz = total - feet * link_mass * radius**2
         ixx = max(total / 2.0, 1e-9) + m * h**2 / 12.0
         return [ixx, ixx, max(izz, 0.1 * total)]
 
     def place(self, pose: Array) -> None:
-        """Put the centre of mass at a pose ``(3,)``, at rest."""
+        """Put the geometric frame at a pose ``(3,)``, at rest."""
+        x, y, theta = (float(v) for v in self.spec.mass_pose(pose))
         pb.resetBasePositionAndOrientation(
             self.body,
-            [float(pose[0]), float(pose[1]), self._rest_height],
-            pb.getQuaternionFromEuler([0.0, 0.0, float(pose[2])]),
+            [x, y, self._rest_height],
+            pb.getQuaternionFromEuler([0.0, 0.0, theta]),
             physicsClientId=self._client,
         )
         pb.resetBaseVelocity(self.body, [0, 0, 0], [0, 0, 0], physicsClientId=self._client)
 
 
-def _hulls(client: int, shape: Shape, height: float) -> list[int]:
-    """Collision shapes whose union is the extruded outline."""
+def _hulls(client: int, spec: ObjectSpec, height: float) -> list[int]:
+    """Collision shapes whose union is the extruded outline, about the centre of mass."""
+    shape = spec.geometry
     if shape.kind == "rectangle":
         size = np.ptp(shape.outline, axis=0) / 2.0
         return [
             pb.createCollisionShape(
-                pb.GEOM_BOX, halfExtents=[size[0], size[1], height / 2.0], physicsClientId=client
+                pb.GEOM_BOX,
+                halfExtents=[size[0], size[1], height / 2.0],
+                collisionFramePosition=[-spec.com[0], -spec.com[1], 0.0],
+                physicsClientId=client,
             )
         ]
-    outlines = [shape.outline] if shape.convex else _wedges(shape.outline)
-    shapes = []
-    for outline in outlines:
-        inner = _inset(outline, _HULL_MARGIN)
-        half = height / 2.0 - _HULL_MARGIN
-        vertices = [[x, y, z] for x, y in inner for z in (-half, half)]
-        shapes.append(
-            pb.createCollisionShape(pb.GEOM_MESH, vertices=vertices, physicsClientId=client)
+    inner = inset(shape.outline, _HULL_MARGIN)
+    half = height / 2.0 - _HULL_MARGIN
+    return [
+        pb.createCollisionShape(
+            pb.GEOM_MESH,
+            vertices=[[x, y, z] for x, y in part for z in (-half, half)],
+            physicsClientId=client,
         )
-    return shapes
-
-
-def _wedges(outline: Array) -> list[Array]:
-    """Convex wedges of a star-shaped outline, merged as long as they stay convex."""
-    wedges: list[list[Array]] = []
-    n = len(outline)
-    current = [np.zeros(2), outline[0]]
-    for i in range(1, n + 1):
-        trial = [*current, outline[i % n]]
-        if len(trial) > 3 and not _convex(np.array(trial)):
-            wedges.append(current)
-            current = [np.zeros(2), current[-1], outline[i % n]]
-        else:
-            current = trial
-    return [np.array(w) for w in [*wedges, current]]
-
-
-def _convex(points: Array) -> bool:
-    edge = np.roll(points, -1, axis=0) - points
-    after = np.roll(edge, -1, axis=0)
-    return bool((edge[:, 0] * after[:, 1] - edge[:, 1] * after[:, 0] >= -1e-12).all())
-
-
-def _inset(outline: Array, distance: float) -> Array:
-    """The outline with every edge moved inward."""
-    edge = np.roll(outline, -1, axis=0) - outline
-    normal = np.column_stack([-edge[:, 1], edge[:, 0]]) / np.hypot(*edge.T)[:, None]
-    before = np.roll(normal, 1, axis=0)
-    bisector = normal + before
-    scale = distance / np.maximum(0.5 * (bisector**2).sum(1), 0.2)
-    moved: Array = outline + bisector * scale[:, None]
-    return moved
+        for part in ([inner] if shape.convex else convex_parts(inner))
+    ]

@@ -1,34 +1,45 @@
 """When the world may step: in real time, or in lockstep with those who command it."""
 
 import math
-from collections.abc import Iterable
+
+import numpy as np
+
+from push_model.arrays import Mask, Rows
 
 
 class Lockstep:
-    """Waits for the answer of every commanded robot to the newest frame."""
+    """Waits for the answer of every commanded robot to the newest frame. Robots are rows."""
 
-    def __init__(self) -> None:
-        self._waiting: set[str] = set()
+    def __init__(self, robots: int) -> None:
+        self._waiting = np.zeros(robots, dtype=bool)
         self._frame: int | None = None
         self._since = 0.0
-
-    def expect(self, frame: int, robots: Iterable[str], now: float) -> None:
-        """A frame (tick number) was published at monotonic time now [s]; robots must answer it."""
-        self._frame, self._waiting, self._since = frame, set(robots), now
-
-    def answer(self, frame: int, robot: str) -> None:
-        """A robot answered a frame."""
-        if frame == self._frame:
-            self._waiting.discard(robot)
-
-    @property
-    def ready(self) -> bool:
+        self.ready = True
         """Whether nobody is waited for."""
-        return not self._waiting
 
-    def overdue(self, now: float, limit: float) -> list[str]:
-        """Robots that have not answered for longer than limit [s]."""
-        return sorted(self._waiting) if now - self._since > limit else []
+    def expect(self, frame: int, robots: Mask, now: float) -> None:
+        """A frame (tick number) was published at monotonic time now [s]; robots must answer it.
+
+        robots: ``(n,)`` mask.
+        """
+        self._frame, self._since = frame, now
+        self._waiting = robots.copy()
+        self.ready = not robots.any()
+
+    def answer(self, frame: int, rows: Rows) -> None:
+        """Robots answered a frame."""
+        if frame == self._frame:
+            self.release(rows)
+
+    def release(self, rows: Rows) -> None:
+        """Wait no longer for robots."""
+        self._waiting[rows] = False
+        self.ready = not self._waiting.any()
+
+    def overdue(self, now: float, limit: float) -> Rows:
+        """``(k,)`` rows of robots that have not answered for longer than limit [s]."""
+        late = now - self._since > limit
+        return np.flatnonzero(self._waiting) if late else np.zeros(0, dtype=np.intp)
 
 
 class RealTime:

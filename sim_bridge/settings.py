@@ -1,13 +1,15 @@
 """Settings of the simulated world and of its motion-capture stream."""
 
-from push_model.settings import SettingsError, bounded, settings
+from push_model.settings import bounded, settings
 
 
 @settings
 class PhysicsSettings:
     """PyBullet's step and solver."""
 
-    time_step: float = bounded(1e-3, low=1e-4, high=1e-2, doc="[s] of a physics step")
+    time_step: float = bounded(
+        1e-3, low=1e-4, high=1e-2, doc="[s] longest physics step; a tick is a whole number of them"
+    )
     solver_iterations: int = bounded(100, low=5, high=1000, doc="constraint solver iterations")
     foot_stiffness: float = bounded(2000.0, low=10.0, high=1e6, doc="[N/m] of an object's foot")
     foot_damping: float = bounded(20.0, low=0.0, high=1e4, doc="[Ns/m] of an object's foot")
@@ -20,7 +22,9 @@ class MotionCaptureSettings:
     rate: float = bounded(100.0, low=1.0, high=1000.0, doc="[Hz]; one control tick per frame")
     position_noise: float = bounded(0.0, low=0.0, high=0.1, doc="[m] standard deviation per axis")
     orientation_noise: float = bounded(0.0, low=0.0, high=1.0, doc="[rad] standard deviation")
-    latency: float = bounded(0.0, low=0.0, high=1.0, doc="[s] from measurement to publication")
+    latency: float = bounded(
+        0.0, low=0.0, high=1.0, doc="[s] a frame comes out at the first tick that is so much later"
+    )
     dropout: float = bounded(0.0, low=0.0, high=1.0, doc="probability that a frame misses a body")
 
 
@@ -28,6 +32,7 @@ class MotionCaptureSettings:
 class BridgeSettings:
     """Pace, safety and publishing of the bridge."""
 
+    world: str = bounded("pybullet", doc="which simulation")
     lockstep: bool = False
     real_time_factor: float = bounded(1.0, low=0.01, high=100.0, doc="pace when not in lockstep")
     command_timeout: float = bounded(0.2, low=0.01, high=5.0, doc="[s] sim time, then wheels stop")
@@ -37,16 +42,8 @@ class BridgeSettings:
     lockstep_timeout: float = bounded(
         2.0, low=0.05, high=60.0, doc="[s] wall time to wait for a tick's answers"
     )
+    discovery_time: float = bounded(
+        0.5, low=0.0, high=10.0, doc="[s] wall time to look for another bridge at start"
+    )
     tf_rate: float = bounded(25.0, low=0.1, high=1000.0, doc="[Hz] sim time, of /tf and markers")
     seed: int = bounded(1, low=0, high=2**62, doc="of the motion-capture noise")
-
-
-def steps_per_tick(physics: PhysicsSettings, capture: MotionCaptureSettings) -> int:
-    """Physics steps in a control tick; the two rates must divide."""
-    ratio = 1.0 / (capture.rate * physics.time_step)
-    if abs(ratio - round(ratio)) > 1e-6 or round(ratio) < 1:
-        raise SettingsError(
-            f"motion_capture.rate {capture.rate} Hz must be a whole divisor of the physics rate "
-            f"{1.0 / physics.time_step:g} Hz"
-        )
-    return round(ratio)

@@ -1,15 +1,16 @@
 import numpy as np
 import pytest
 
-from push_model import SettingsError
 from sim_bridge.motion_capture import MotionCapture
 from sim_bridge.pace import Lockstep, RealTime
-from sim_bridge.settings import MotionCaptureSettings, PhysicsSettings, steps_per_tick
+from sim_bridge.settings import MotionCaptureSettings
+from sim_bridge.world import BodyPoses
+from sim_bridge.worlds import steps_of
 
 
 def test_noise_has_the_given_spread_and_comes_from_the_seed():
     settings = MotionCaptureSettings(position_noise=2e-4, orientation_noise=2e-3)
-    truth = {"a": np.array([1.0, 2.0, 0.5])}
+    truth = BodyPoses(("a",), np.array([[1.0, 2.0, 0.5]]))
 
     def run(seed):
         capture = MotionCapture(settings, seed)
@@ -17,13 +18,15 @@ def test_noise_has_the_given_spread_and_comes_from_the_seed():
 
     poses = run(3)
     assert poses.std(axis=0) == pytest.approx([2e-4, 2e-4, 2e-3], rel=0.05)
-    assert poses.mean(axis=0) == pytest.approx(truth["a"], abs=1e-4)
+    assert poses.mean(axis=0) == pytest.approx([1.0, 2.0, 0.5], abs=1e-4)
     assert np.array_equal(poses, run(3)) and not np.array_equal(poses, run(4))
 
 
 def test_latency_delays_publication_not_the_stamp():
     capture = MotionCapture(MotionCaptureSettings(latency=0.03), 1)
-    frames = [capture.observe(k, {"a": np.full(3, float(k))}) for k in range(1, 10)]
+    frames = [
+        capture.observe(k, BodyPoses(("a",), np.full((1, 3), float(k)))) for k in range(1, 10)
+    ]
     assert frames[:3] == [None] * 3
     for k, frame in enumerate(frames[3:], start=1):
         assert frame.stamp == k and frame.poses["a"][0] == k
@@ -31,27 +34,34 @@ def test_latency_delays_publication_not_the_stamp():
 
 def test_dropouts_leave_bodies_out():
     capture = MotionCapture(MotionCaptureSettings(dropout=0.25), 1)
-    seen = [
-        set(capture.observe(k, {"a": np.zeros(3), "b": np.zeros(3)}).poses) for k in range(4000)
-    ]
+    truth = BodyPoses(("a", "b"), np.zeros((2, 3)))
+    seen = [set(capture.observe(k, truth).poses) for k in range(4000)]
     assert np.mean(["a" in s for s in seen]) == pytest.approx(0.75, abs=0.03)
     assert {"a"} in seen and {"b"} in seen  # independent per body
 
 
-def test_rates_must_divide():
-    assert steps_per_tick(PhysicsSettings(), MotionCaptureSettings(rate=100.0)) == 10
-    with pytest.raises(SettingsError, match="divisor"):
-        steps_per_tick(PhysicsSettings(), MotionCaptureSettings(rate=300.0))
+@pytest.mark.parametrize("rate", [25.0, 30.0, 60.0, 77.0, 100.0, 120.0, 144.0, 240.0, 1000.0])
+def test_a_tick_of_any_rate_is_a_whole_number_of_steps_that_are_short_enough(rate):
+    steps = steps_of(1.0 / rate, 1e-3)
+    assert 1.0 / rate / steps <= 1e-3 * (1.0 + 1e-9)
+    assert steps == 1 or 1.0 / rate / (steps - 1) > 1e-3
+    if 1000.0 % rate == 0.0:
+        assert 1.0 / rate / steps == 1e-3
 
 
 def test_lockstep_waits_for_everybody_and_only_for_the_newest_frame():
-    lockstep = Lockstep()
-    lockstep.expect(7, ["a", "b"], now=1.0)
-    lockstep.answer(7, "a")
-    lockstep.answer(6, "b")
-    assert not lockstep.ready and lockstep.overdue(3.0, 1.0) == ["b"]
-    lockstep.answer(7, "b")
-    assert lockstep.ready and lockstep.overdue(9.0, 1.0) == []
+    lockstep = Lockstep(3)
+    lockstep.expect(7, np.array([True, True, False]), now=1.0)
+    lockstep.answer(7, np.array([0]))
+    lockstep.answer(6, np.array([1]))
+    assert not lockstep.ready and lockstep.overdue(3.0, 1.0).tolist() == [1]
+    assert lockstep.overdue(1.5, 1.0).size == 0
+    lockstep.answer(7, np.array([1, 2]))
+    assert lockstep.ready and lockstep.overdue(9.0, 1.0).size == 0
+    lockstep.expect(8, np.array([False, False, True]), now=9.0)
+    assert not lockstep.ready
+    lockstep.release(np.array([2]))  # it has gone
+    assert lockstep.ready
 
 
 def test_real_time_pace_catches_up_a_little_and_never_in_a_burst():

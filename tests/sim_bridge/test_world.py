@@ -9,14 +9,14 @@ import pytest
 from push_model import se2, uniform_pressure_radius
 from push_model.occupancy import MapSpec, OccupancyGrid
 from push_model.specs import EnvironmentSpec, ObjectSpec
+from sim_bridge.pybullet_world import PyBulletWorld
 from sim_bridge.settings import PhysicsSettings
-from sim_bridge.world import World
 
 OPEN = EnvironmentSpec((6.0, 6.0))
 
 
 def world(robots=None, objects=None):
-    return World(OPEN, robots or {}, objects or {})
+    return PyBulletWorld(OPEN, robots or {}, objects or {})
 
 
 def test_wheels_roll_without_slip(robot):
@@ -146,7 +146,7 @@ def test_convex_and_concave_objects_stand_and_slide(robot):
         {"flower": {"radius": 0.08, "amplitude": 0.015, "petals": 5}},
     ):
         item = ObjectSpec(shape, 0.1, 0.06, 0.3, 0.2)
-        with World(OPEN, {}, {"b": (item, np.zeros(3))}, PhysicsSettings()) as w:
+        with PyBulletWorld(OPEN, {}, {"b": (item, np.zeros(3))}, PhysicsSettings()) as w:
             w.step(300)
             w.set_velocity("b", np.array([0.3, 0.0, 0.0]))
             w.step(10)
@@ -160,7 +160,7 @@ def test_occupied_cells_of_a_map_are_walls(robot):
     occupied = np.zeros((40, 60), dtype=bool)
     occupied[:, 45:50] = True  # x from 0.45 to 0.50
     room = MapSpec(OccupancyGrid(occupied, 0.02, np.array([-0.45, -0.4])), 0.1, 0.3)
-    with World(room, {"r": (robot, np.zeros(3))}, {}) as w:
+    with PyBulletWorld(room, {"r": (robot, np.zeros(3))}, {}) as w:
         w.command("r", 0.1, 0.0)
         w.step(6000)
         x, y, _ = w.poses()["r"]

@@ -191,7 +191,8 @@ class Tampered:
 
 
 def tamper(run, change):
-    run.bridge._poses_publisher = Tampered(run.bridge._poses_publisher, change)
+    outputs = run.bridge.outputs
+    outputs.poses = Tampered(outputs.poses, change)
 
 
 def test_nan_poses_stop_the_robot_and_good_ones_let_it_go_on(short):
@@ -264,7 +265,7 @@ def test_frozen_poses_end_the_push(short):
 def test_object_taken_away_is_noticed_and_replanned(short):
     """FAULTS 16: moved by hand in mid-push; the goal is reached all the same."""
     pushing(short)
-    short.bridge.world.objects["box"].place(np.array([-0.6, -0.5, 0.0]))
+    short.bridge.world.place("box", np.array([-0.6, -0.5, 0.0]))
     state = ends(short, 200.0)
     assert state.error_code == 0 and state.replans >= 1, state.reason
     assert final_errors(short.observer.trace, short.scenario.goal)[0] < 0.02
@@ -276,7 +277,7 @@ def test_object_moved_before_the_push_is_noticed(short):
         lambda: short.observer.state.state == JobState.POSITIONING and short.bridge.time > 1.0,
         20.0,
     )
-    short.bridge.world.objects["box"].place(np.array([-0.45, 0.3, 0.0]))
+    short.bridge.world.place("box", np.array([-0.45, 0.3, 0.0]))
     state = ends(short, 200.0)
     assert state.error_code == 0 and state.replans >= 1, state.reason
 

@@ -1,0 +1,200 @@
+"""Commands to robots: from a topic each, or from one message for many; through the gate."""
+
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import TwistStamped
+from rclpy.node import Node
+
+from push_model.arrays import Mask, Rows
+from push_model.drives import HolonomicDrive, TorqueDrive
+from push_model.specs import RobotSpec
+from push_msgs.msg import Velocities, WheelTorques
+from push_ros.command_gate import Admitted, CommandGate, Limits
+from push_ros.conversions import time_from_ros
+from push_ros.diagnostics import Diagnostics
+from push_ros.names import Names
+from push_ros.qos import COMMAND
+from push_ros.validation import FRAME
+from sim_bridge.world import World
+
+_ABSURD = 10.0
+"""Commands beyond so many times what a robot can do are refused, not scaled down."""
+_OWN_FRAMES = ("", "base_link")
+
+
+class CommandIntake:
+    """Subscribes to every way of command, and passes on what the gate admits."""
+
+    def __init__(
+        self,
+        node: Node,
+        names: Names,
+        diagnostics: Diagnostics,
+        obeyed: Callable[[float, Rows], None],
+    ) -> None:
+        """obeyed: called with the stamp [s] that a command answers and the robots' rows."""
+        self._node, self._names, self._diagnostics = node, names, diagnostics
+        self._obeyed = obeyed
+        self.now = 0.0
+        """[s] Sim time."""
+        self.changed = False
+        """Whether commanded() may have changed since it was asked."""
+        self.unseen: Rows = np.zeros(0, dtype=np.intp)
+        """Robots that the newest frame has not: who answers it for many cannot name them."""
+        self._inputs: list[Any] = []
+        self._watched: set[str] = set()
+        self._many = names.world("cmd_vels")
+        self._subscribe_to(Velocities, self._many, self._on_velocities, self._inputs)
+        self._own_inputs: list[Any] = []
+        self.gate = CommandGate((), Limits(np.zeros((0, 3)), np.zeros(0), 0.0, 0.0))
+
+    def connect(self, world: World, robots: dict[str, RobotSpec], age: float, wall: float) -> None:
+        """Take commands for the robots of a world.
+
+        age: [s] of the oldest fresh command, in sim time; wall: [s] of wall time.
+        """
+        self._world = world
+        drives = [spec.drive for spec in robots.values()]
+        twist = [
+            (s.max_speed, s.max_speed * isinstance(s.drive, HolonomicDrive), s.max_turn_rate)
+            for s in robots.values()
+        ]
+        torque = [d.max_torque if isinstance(d, TorqueDrive) else 0.0 for d in drives]
+        limits = Limits(
+            _ABSURD * np.array(twist).reshape(-1, 3), _ABSURD * np.array(torque), age, wall
+        )
+        self.gate = CommandGate(tuple(robots), limits)
+        for subscription in self._own_inputs:
+            self._node.destroy_subscription(subscription)
+        self._own_inputs = []
+        self._topics: list[tuple[str, ...]] = []
+        for robot, drive in zip(robots, drives, strict=True):
+            topic = self._names.robot(robot, "cmd_vel")
+            self._subscribe_to(
+                TwistStamped, topic, partial(self._on_twist, robot), self._own_inputs
+            )
+            self._topics.append((topic,))
+            if isinstance(drive, TorqueDrive):
+                topic = self._names.robot(robot, "wheel_torques")
+                self._subscribe_to(
+                    WheelTorques, topic, partial(self._on_torques, robot), self._own_inputs
+                )
+                self._topics[-1] += (topic,)
+        self.restart()
+
+    def _subscribe_to(
+        self, kind: Any, topic: str, handler: Callable[[Any], None], kept: list[Any]
+    ) -> None:
+        events = self._diagnostics.subscription_events(topic)
+        kept.append(
+            self._node.create_subscription(kind, topic, handler, COMMAND, event_callbacks=events)
+        )
+        if topic not in self._watched:
+            self._watched.add(topic)
+            self._diagnostics.watch_publishers(topic)
+
+    def restart(self) -> None:
+        """Forget all commands."""
+        self.gate.restart()
+        self._named = np.zeros(len(self.gate.names), dtype=bool)  # on cmd_vels, so far
+
+    def commanded(self) -> Mask:
+        """``(n,)`` mask of robots that somebody publishes commands for.
+
+        Who is commanded on cmd_vels is known from its first message on; until then it may be
+        everybody who has no commander of his own.
+        """
+        self.changed = False
+        count = self._node.count_publishers
+        own = np.array([any(count(t) > 0 for t in topics) for topics in self._topics], dtype=bool)
+        if count(self._many) > 0:
+            own |= self._named if self._named.any() else True
+        return own & np.isin(self.gate.names, self._world.names)
+
+    def forget(self, rows: Rows) -> None:
+        """Robots that were waited for in vain are not taken for commanded on cmd_vels any more."""
+        self._named[rows] = False
+        self.changed = True
+
+    def note_seen(self, names: tuple[str, ...]) -> None:
+        """Tell the bodies in the newest frame."""
+        here = self._world.names
+        if len(names) == len(here):
+            self.unseen = np.zeros(0, dtype=np.intp)
+        else:
+            robots = set(self.gate.names) & set(here) - set(names)
+            self.unseen = self.gate.rows(sorted(robots))
+
+    def watch(self, now: float) -> Rows:
+        """Stop robots that drive without a fresh command at sim time now [s]; their rows."""
+        rows: Rows = self.gate.silent(now, time.monotonic())
+        if rows.size:
+            self.stop(rows)
+        return rows
+
+    def stop(self, rows: Rows) -> None:
+        """Command robots to stand."""
+        self.gate.stop(rows)
+        self._world.command_all([self.gate.names[r] for r in rows], np.zeros((len(rows), 3)))
+
+    def _on_twist(self, robot: str, message: TwistStamped) -> None:
+        if robot not in self.gate.names:
+            return  # one that is gone with the last scenario
+        t = message.twist
+        stamp = time_from_ros(message.header.stamp)
+        twist = np.array([[t.linear.x, t.linear.y, t.angular.z]])
+        admitted = self.gate.admit([robot], twist, stamp, self.now, time.monotonic())
+        if self._admitted(self._names.robot(robot, "cmd_vel"), admitted):
+            if twist[0, 1] == 0.0:
+                self._world.command(robot, float(twist[0, 0]), float(twist[0, 2]))
+            else:
+                self._world.command_all([robot], admitted.values)
+            self._obeyed(stamp, admitted.rows)
+
+    def _on_torques(self, robot: str, message: WheelTorques) -> None:
+        if robot not in self.gate.names:
+            return
+        stamp = time_from_ros(message.header.stamp)
+        torques = np.array([message.left, message.right])
+        admitted = self.gate.admit_torques(robot, torques, stamp, self.now, time.monotonic())
+        if self._admitted(self._names.robot(robot, "wheel_torques"), admitted):
+            self._world.command_torques(robot, message.left, message.right)
+            self._obeyed(stamp, admitted.rows)
+
+    def _on_velocities(self, message: Velocities) -> None:
+        n = len(message.names)
+        columns = [
+            np.asarray(c, dtype=np.float64) if len(c) else np.zeros(n)
+            for c in (message.vx, message.vy, message.omega)
+        ]
+        frame = message.header.frame_id
+        if {len(c) for c in columns} != {n}:
+            self._diagnostics.refuse(self._many, "arrays must be as long as names, or empty")
+            return
+        if frame != FRAME and frame not in _OWN_FRAMES:
+            self._diagnostics.refuse(self._many, f"frame '{frame}', not base_link or {FRAME}")
+            return
+        fixed = frame == FRAME
+        twists = np.column_stack(columns)
+        stamp = time_from_ros(message.header.stamp)
+        admitted = self.gate.admit(message.names, twists, stamp, self.now, time.monotonic(), fixed)
+        if self._admitted(self._many, admitted):
+            known = self.gate.names
+            robots = (
+                message.names if len(admitted.rows) == n else [known[row] for row in admitted.rows]
+            )
+            self._world.command_all(robots, admitted.values, fixed)
+            if not self._named[admitted.rows].all():
+                self._named[admitted.rows] = True
+                self.changed = True
+            blind = self.unseen[self._named[self.unseen]]
+            self._obeyed(stamp, np.append(admitted.rows, blind) if blind.size else admitted.rows)
+
+    def _admitted(self, topic: str, admitted: Admitted) -> bool:
+        for reason in admitted.refused:
+            self._diagnostics.refuse(topic, reason)
+        return bool(admitted.rows.size)

@@ -1,0 +1,35 @@
+"""A robot whose wheels hold the speeds that they are told, as an e-puck's."""
+
+from push_model.arrays import Array
+from push_model.drives import SpeedDrive
+from push_model.specs import RobotSpec
+from sim_bridge.robot_body import WheeledBody
+from sim_bridge.wheeled_urdf import Wheels
+
+
+class SpeedBody(WheeledBody):
+    """Wheels with a speed servo of bounded torque."""
+
+    def __init__(self, client: int, spec: RobotSpec, drive: SpeedDrive, start: Array) -> None:
+        self.drive = drive
+        roll = drive.wheel_mass * drive.wheel_radius**2 / 2.0
+        wheels = Wheels(drive.wheel_radius, drive.half_track, drive.wheel_mass, (roll, roll))
+        super().__init__(client, spec, wheels, drive.wheel_friction)
+        self.place(start)
+
+    def place(self, pose: Array) -> None:
+        """Put the axle midpoint at a pose ``(3,)``, at rest."""
+        self.put(pose)
+        self.command(0.0, 0.0)
+
+    def command(self, v: float, omega: float) -> None:
+        """Set the wheel motors to a twist, scaled down to what the wheels can do."""
+        v, omega = self.drive.saturate(v, omega)
+        self.servo(self.drive.wheel_speeds(v, omega), self.drive.wheel_torque)
+
+    def command_torques(self, left: float, right: float) -> None:
+        """Its wheels take speeds, not torques."""
+        raise ValueError("wheels of a differential drive take no torques; command a velocity")
+
+    def before_step(self) -> None:
+        """PyBullet's motors do it all."""
