@@ -9,7 +9,10 @@ INTERFACES := $(VENV)/.interfaces
 export OPENBLAS_NUM_THREADS = 1
 export ROS_AUTOMATIC_DISCOVERY_RANGE = LOCALHOST
 
-.PHONY: install demo test lint clean
+CORES = tests/push_model tests/push_scenario tests/push_estimation tests/push_planner tests/push_mpc \
+  tests/push_supervisor tests/push_bringup tests/planar_push tests/push_record
+
+.PHONY: install demo test test-fast coverage lint clean
 install: $(STAMP)
 
 $(VENV)/bin/python:
@@ -36,14 +39,21 @@ $(STAMP): $(INTERFACES) pyproject.toml constraints.txt
 demo: $(STAMP)
 	$(BIN)/planar-push demo --out results/demo
 
-test: $(STAMP)
-	$(BIN)/ruff check .
-	$(BIN)/ruff format --check -q .
-	$(BIN)/mypy
-	$(BIN)/python -m pytest
+# What starts processes in real time runs alone; the rest side by side, each in its own domain.
+test: lint
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not live"
+	$(BIN)/python -m pytest -m live
+
+# The cores: no nodes, no simulation of whole jobs.
+test-fast: $(STAMP)
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not live" --durations=5 $(CORES)
+
+coverage: $(STAMP)
+	$(BIN)/python -m pytest -n 2 -m "not live" --durations=0 --cov --cov-branch --cov-report=term
 
 lint: $(STAMP)
 	$(BIN)/ruff check .
+	$(BIN)/ruff format --check -q .
 	$(BIN)/mypy
 
 clean:

@@ -1,32 +1,24 @@
 """Benchmarks: speed beside rivals, and the physics against theory. ``planar-push bench``."""
 
+import importlib
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from push_record.recorder import revision
+NAMES = ("curve", "mpc", "plan", "latency", "lockstep", "physics", "stable-push")
+"""Modules of this package with a ``run``; a dash for each underscore."""
 
 
 def run(what: str, out: Path | None) -> int:
     """Run one benchmark or all; returns 0 when every bound holds."""
-    from benchmarks import curve, latency, lockstep, mpc, physics, plan, stable_push
+    from push_record.revision import revision
 
-    known: dict[str, Callable[[], dict[str, Any]]] = {
-        "curve": curve.run,
-        "mpc": mpc.run,
-        "plan": plan.run,
-        "latency": latency.run,
-        "lockstep": lockstep.run,
-        "physics": physics.run,
-        "stable-push": stable_push.run,
-    }
-    names = list(known) if what == "all" else [what]
+    names = list(NAMES) if what == "all" else [what]
     results: dict[str, Any] = {"revision": revision()}
     good = True
     for name in names:
         print(f"== {name}", flush=True)
-        results[name] = known[name]()
+        results[name] = importlib.import_module(f"benchmarks.{name.replace('-', '_')}").run()
         for bound, (value, limit, holds) in results[name].get("bounds", {}).items():
             good &= holds
             print(f"  {'ok  ' if holds else 'FAIL'} {bound}: {value:.4g} (bound {limit})")

@@ -11,19 +11,23 @@ from rclpy.signals import SignalHandlerOptions
 
 from benchmarks.measure import at_most
 from push_bringup.launcher import Child, Launcher
+from push_bringup.systems import MODULES, single
 from push_model import line, unicycle_step
 from push_msgs.action import FollowTrajectory
 from push_msgs.msg import Poses
 from push_ros.conversions import poses_to_ros, trajectory_to_ros
 from push_ros.process import Spinner, claim_domain, prepare_environment
 from push_ros.qos import COMMAND, STREAM
+from push_scenario.scenario import load_scenario
 
 
 def run(seconds: float = 15.0) -> dict[str, Any]:
     """Wall time from publishing a frame to receiving its command."""
     claim_domain()
     prepare_environment()
-    launcher = Launcher([Child("controller", ["controller", "--scenario", "short"])])
+    controller = next(n for n in single(load_scenario("short")) if n.kind == "controller")
+    words = controller.words("short")
+    launcher = Launcher([Child("controller", MODULES["controller"], words)])
     launcher.start()
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("latency")

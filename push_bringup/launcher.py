@@ -5,31 +5,38 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from push_ros.process import die_with_parent, prepare_environment
 
 _GRACE = 2.5  # [s] after SIGINT, then SIGTERM
 _MOST_DEATHS = 5  # of one node, until it is not started again
 _LAST = 1.5  # [s] after SIGTERM, then SIGKILL
+_TAIL = 600  # [characters] of what a dead node said
 
 
 @dataclass
 class Child:
-    """A node in a process of its own."""
+    """A node in a process of its own: ``python -m module words``.
+
+    bag: folder that it writes, when it is a recorder.
+    """
 
     name: str
+    module: str
     arguments: list[str]
+    bag: Path | None = None
     process: "subprocess.Popen[bytes] | None" = None
     deaths: int = 0
 
     @property
     def words(self) -> list[str]:
-        """Its command line; one that was started again writes beside what is there."""
+        """Its command line; a recorder that was started again writes beside what is there."""
         words = list(self.arguments)
-        if self.deaths and "--out" in words:
-            words[words.index("--out") + 1] += f"-{self.deaths + 1}"
+        if self.bag is not None and self.deaths:
+            words += ["-p", f'out:="{self.bag}-{self.deaths + 1}"']
         return words
 
 
@@ -37,20 +44,27 @@ class Launcher:
     """Runs children until it is told to stop or one of them dies.
 
     respawn: start a dead child again instead of stopping.
+    logs: folder for what the children say; on the terminal when it is not given.
     """
 
     def __init__(
         self,
-        children: list[Child],
+        children: Sequence[Child],
         respawn: bool = False,
         say: Callable[[str], None] = lambda text: print(text, file=sys.stderr, flush=True),
+        logs: Path | None = None,
+        domain: int | None = None,
     ) -> None:
-        self.children = children
+        """domain: ROS domain of the children; that of the environment when it is not given."""
+        self.children = list(children)
         self._respawn = respawn
         self._say = say
+        self._logs = logs
         self._stopping = False
         self._gave_up = False
         self._environment = prepare_environment(dict(os.environ))
+        if domain is not None:
+            self._environment["ROS_DOMAIN_ID"] = str(domain)
 
     def start(self) -> None:
         """Start all children."""
@@ -59,14 +73,42 @@ class Launcher:
                 self._start(child)
 
     def _start(self, child: Child) -> None:
-        command = [sys.executable, "-m", "planar_push.cli", "node", *child.words]
+        command = [sys.executable, "-m", child.module, *child.words]
+        if self._logs is None:
+            self._open(child, command, None)
+            return
+        with self._log(child).open("ab") as file:
+            self._open(child, command, file.fileno())
+
+    def _open(self, child: Child, command: list[str], output: int | None) -> None:
         child.process = subprocess.Popen(
-            command, env=self._environment, start_new_session=True, preexec_fn=die_with_parent
+            command,
+            env=self._environment,
+            start_new_session=True,
+            preexec_fn=die_with_parent,
+            stdout=output,
+            stderr=output,
         )
+
+    def _log(self, child: Child) -> Path:
+        assert self._logs is not None
+        return self._logs / f"{child.name.replace('/', '-')}.log"
+
+    def last_words(self, name: str) -> str:
+        """The end of what a child said, where that is kept."""
+        (child,) = (c for c in self.children if c.name == name)
+        if self._logs is None or not self._log(child).is_file():
+            return ""
+        return self._log(child).read_text(errors="replace").strip()[-_TAIL:]
 
     def request_stop(self) -> None:
         """May be called from a signal handler."""
         self._stopping = True
+
+    @property
+    def stopping(self) -> bool:
+        """Whether it has been asked to stop."""
+        return self._stopping
 
     def check(self) -> list[str]:
         """Names of children that died since the last check; respawns them if so asked."""
@@ -90,11 +132,16 @@ class Launcher:
             self._start(child)
         return dead
 
+    def failed(self) -> list[str]:
+        """Names of children that died since the last check and will not come back."""
+        dead = self.check()
+        return dead if self._gave_up or not self._respawn else []
+
     def run(self, finished: Callable[[], bool] = lambda: False) -> int:
         """Watch until stopped; 0 when asked to stop or finished, 1 when a child died."""
         code = 0
         while not self._stopping and not finished():
-            if self.check() and (self._gave_up or not self._respawn):
+            if self.failed():
                 self._say("stopping the rest")
                 code = 1
                 break
@@ -119,17 +166,3 @@ class Launcher:
                 c.process and c.process.poll() is None for c in alive
             ):
                 time.sleep(0.02)
-
-
-def single_robot(
-    scenario: str, record: str = "", extra: dict[str, list[str]] | None = None
-) -> list[Child]:
-    """The children of a single-robot run; extra: further command-line words by node name."""
-    extra = extra or {}
-    children = [
-        Child(name, [name, "--scenario", scenario, *extra.get(name, [])])
-        for name in ("bridge", "planner", "controller", "supervisor")
-    ]
-    if record:
-        children.insert(0, Child("recorder", ["recorder", "--scenario", scenario, "--out", record]))
-    return children

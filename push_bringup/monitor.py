@@ -1,129 +1,205 @@
-"""A small ROS client for people: sends a goal, shows what the supervisor does."""
+"""A small ROS client for people: sends a goal, tells what becomes of it."""
 
-import sys
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
-import rclpy
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import OccupancyGrid
-from rclpy.signals import SignalHandlerOptions
 
+from push_bringup.job_result import JobEvent, JobResult, errors_of, result_of
+from push_bringup.systems import team_space
+from push_model.arrays import Array
+from push_model.jobs import JobError
 from push_msgs.msg import JobState, Poses
-from push_ros.conversions import pose_stamped_to_ros, time_from_ros
-from push_ros.process import Spinner, heard, prepare_environment
+from push_ros.conversions import pose_stamped_to_ros, poses_from_ros, time_from_ros
+from push_ros.latched import visitor
+from push_ros.names import Names, space
+from push_ros.process import heard
 from push_ros.qos import COMMAND, LATCHED, STREAM
+
+Pose = tuple[float, float, float]
+_PROGRESS = 2.0  # [s] wall time between events that tell the distance
+_SAME = 1e-6  # [m], [rad] goals that are the same
 
 
 class Monitor:
-    """Use it as a context manager; it owns its ROS context.
+    """Watches the job of a team, and sends it goals. Use it as a context manager.
 
-    state: newest of the supervisor. position: (x, y) [m] of the object. Both None until heard.
+    state: newest of the owner of the job. pose: ``(3,)`` of its object. Both None until heard.
     """
 
-    def __enter__(self) -> "Monitor":
-        prepare_environment()
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-        self._node = rclpy.create_node("monitor")
+    def __init__(
+        self,
+        namespace: str = "",
+        team: str = "",
+        context: Any = None,
+        on_event: Callable[[JobEvent], None] = lambda event: None,
+    ) -> None:
+        """namespace: the world's. context: of ROS; one of its own when it is not given."""
+        self.team = team
+        self._names = Names(space(namespace), space(team_space(namespace, team)))
+        self._context = context
+        self._on_event = on_event
+        self._stack = ExitStack()
         self.state: JobState | None = None
-        self.position: tuple[float, float] | None = None
+        self.pose: Array | None = None
         self.stamp = 0.0  # [s] of the newest poses
         self._map = False
-        self._news = 0
-        self._goal: tuple[float, float, float] | None = None
+        self._goal: Pose | None = None
         self._sent: PoseStamped | None = None
-        self._publisher = self._node.create_publisher(PoseStamped, "goal_pose", COMMAND)
-        self._node.create_subscription(JobState, "job_state", self._on_state, LATCHED)
-        self._node.create_subscription(OccupancyGrid, "map", self._on_map, LATCHED)
-        self._node.create_subscription(Poses, "poses", self._on_poses, STREAM)
-        self._spinner = Spinner([self._node])
+        self._news: list[JobState] = []
+        self._began = False
+        self._begin = self._told = 0.0
+
+    def __enter__(self) -> "Monitor":
+        node, self._spinner = self._stack.enter_context(visitor(self._context))
+        self._node, names = node, self._names
+        self._publisher = node.create_publisher(PoseStamped, names.team("goal_pose"), COMMAND)
+        node.create_subscription(JobState, names.team("job_state"), self._on_state, LATCHED)
+        node.create_subscription(OccupancyGrid, names.world("map"), self._on_map, LATCHED)
+        node.create_subscription(Poses, names.world("poses"), self._on_poses, STREAM)
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._spinner.close()
-        rclpy.try_shutdown()
+        self._stack.close()
 
     def _on_state(self, message: JobState) -> None:
         self.state = message
-        self._news += 1
         if self._goal is not None:
-            print(f"  {message.state_name.lower():12s} {message.reason}", flush=True)
+            self._news.append(message)
 
     def _on_map(self, message: OccupancyGrid) -> None:
         self._map = True
 
     def _on_poses(self, message: Poses) -> None:
         self.stamp = time_from_ros(message.header.stamp)
-        if len(message.names) >= 2:
-            self.position = (message.x[-1], message.y[-1])
+        if self.state is not None:
+            item = str(self.state.object)
+            self.pose = poses_from_ros(message, (item,))[0].get(item, self.pose)
 
     def wait(self, limit: float, condition: Callable[[], bool]) -> bool:
         """Spin until the condition holds; whether it did within limit [s] of wall time."""
-        return self._spinner.until(condition, limit)
+        return bool(self._spinner.until(condition, limit))
+
+    def spin(self, limit: float = 0.05) -> None:
+        """Handle what is there, or wait for it up to limit [s]."""
+        self._spinner.once(limit)
+
+    @property
+    def ready(self) -> bool:
+        """Whether a goal would be heard, and the job could begin."""
+        return (
+            self.state is not None
+            and self._map
+            and self.pose is not None
+            and heard(self._node, self._publisher)
+            and self.supervised
+        )
 
     def connect(self, limit: float, alive: Callable[[], bool] = lambda: True) -> bool:
-        """Wait for supervisor, map and poses; False after limit [s] or when not alive."""
+        """Wait until a goal would be heard; False after limit [s] or when not alive."""
         end = time.monotonic() + limit
         while time.monotonic() < end and alive():
-            ready = (
-                self.state is not None
-                and self._map
-                and self.position is not None
-                and heard(self._node, self._publisher)
-                and self.supervised
-            )
-            if ready:
+            if self.ready:
                 return True
-            self._spinner.once(0.05)
+            self.spin()
         return False
+
+    def missing(self) -> str:
+        """What a goal still waits for, for a person."""
+        if not self.supervised:
+            return f"nobody publishes {self._names.team('job_state')}"
+        if not self._map:
+            return f"no map on {self._names.world('map')}"
+        if self.pose is None:
+            return f"no pose of the object on {self._names.world('poses')}"
+        return "" if self.ready else f"nobody listens to {self._names.team('goal_pose')}"
+
+    @property
+    def goal_topic(self) -> str:
+        """Where its goals go."""
+        return str(self._names.team("goal_pose"))
 
     @property
     def supervised(self) -> bool:
-        """Whether there is a supervisor; one that was killed is missed after some seconds."""
-        return int(self._node.count_publishers("job_state")) > 0
+        """Whether there is an owner of jobs; one that was killed is missed after some seconds."""
+        return int(self._node.count_publishers(self._names.team("job_state"))) > 0
 
-    def send_goal(self, goal: tuple[float, float, float]) -> None:
+    def send_goal(self, goal: Pose) -> None:
         """Publish a goal (x, y, theta) [m, m, rad]."""
-        self._goal = goal
-        self._news = 0
+        self._goal = (float(goal[0]), float(goal[1]), float(goal[2]))
+        self._news, self._began = [], False
+        self._begin, self._told = self.stamp, time.monotonic()
         # its stamp tells it from the goals of others
-        self._sent = pose_stamped_to_ros(np.array(goal), time.time())
+        self._sent = pose_stamped_to_ros(np.array(self._goal), time.time())
         self._publisher.publish(self._sent)
 
-    def _is_mine(self, message: PoseStamped) -> bool:
-        assert self._sent is not None
-        return bool(message == self._sent)
+    def _pursues_mine(self, state: JobState) -> bool:
+        """Whether the job is that of the goal sent, or of the same goal sent by somebody else."""
+        if state.goal == self._sent:
+            return True
+        if not self._began or self._sent is None:
+            return False
+        mine, other = self._sent.pose, state.goal.pose
+        gaps = (
+            mine.position.x - other.position.x,
+            mine.position.y - other.position.y,
+            mine.orientation.z - other.orientation.z,
+            mine.orientation.w - other.orientation.w,
+        )
+        return max(abs(float(g)) for g in gaps) < _SAME
 
-    def follow(self, limit: float, alive: Callable[[], bool]) -> int:
-        """Show progress until the job ends, or its plan waits for the execute command.
+    def poll(self) -> JobResult | None:
+        """The result of the goal that was sent, as soon as there is one."""
+        assert self._goal is not None, "no goal has been sent"
+        while self._news:
+            state = self._news.pop(0)
+            if state.refusals and state.refused_goal == self._sent:
+                refused = result_of(state, self._goal, self.pose, 0.0, self.team)
+                code, reason = JobError(int(state.refusal_code)), f"goal refused: {state.refusal}"
+                return replace(refused, code=code, reason=reason, refused=True)
+            if self._pursues_mine(state):
+                self._began = True
+                self._tell("state")
+                if state.state == JobState.IDLE:
+                    duration = self.stamp - self._begin
+                    return result_of(state, self._goal, self.pose, duration, self.team)
+            elif self._began:
+                return self.unfinished("another goal has replaced this one", JobError.PREEMPTED)
+        if time.monotonic() - self._told > _PROGRESS:
+            self._tell("progress")
+        return None
 
-        Returns 0 on success, 1 otherwise.
-        """
+    def unfinished(self, reason: str, code: JobError | None = None) -> JobResult:
+        """The result of a goal whose end nobody saw."""
         assert self._goal is not None
+        position, orientation = errors_of(self._goal, self.pose)
+        duration = self.stamp - self._begin
+        return JobResult(code, reason, self._goal, position, orientation, duration, team=self.team)
+
+    def _tell(self, kind: str) -> None:
+        assert self._goal is not None and (self.state is not None)
+        self._told = time.monotonic()
+        gap = None if self.pose is None else errors_of(self._goal, self.pose)[0]
+        state = self.state
+        name, reason = str(state.state_name).lower(), str(state.reason)
+        self._on_event(JobEvent(kind, self.team, self.stamp, name, reason, gap))
+
+    def follow(self, limit: float, alive: Callable[[], bool] = lambda: True) -> JobResult:
+        """Wait until the job ends, or its plan waits for the execute command.
+
+        Its code is None after limit [s] of wall time, or when no longer alive.
+        """
         end = time.monotonic() + limit
-        shown = 0.0
-        began = False
         while time.monotonic() < end:
             if not alive():
-                print("error: the nodes have ended before the job", file=sys.stderr)
-                return 1
-            self._spinner.once(0.1)
-            state = self.state
-            if self._news and state is not None:
-                if state.refusals and self._is_mine(state.refused_goal):
-                    print(f"  goal refused: {state.refusal}", flush=True)
-                    return 1
-                if self._is_mine(state.goal):
-                    began = True
-                    if state.state == JobState.IDLE:
-                        return 0 if state.error_code == 0 else 1
-                elif began:
-                    print("error: another goal has replaced this one", file=sys.stderr)
-                    return 1
-            if time.monotonic() - shown > 2.0 and self.position is not None:
-                shown = time.monotonic()
-                gap = np.hypot(self.position[0] - self._goal[0], self.position[1] - self._goal[1])
-                print(f"  {gap:6.3f} m to go", flush=True)
-        print("error: the job did not end in time", file=sys.stderr)
-        return 1
+                return self.unfinished("the nodes have ended before the job")
+            self.spin()
+            result = self.poll()
+            if result is not None:
+                return result
+        return self.unfinished(f"the job did not end within {limit:g} s")

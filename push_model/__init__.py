@@ -14,6 +14,7 @@ from push_model.limit_surface import (
     uniform_pressure_radius,
 )
 from push_model.push_segment import PushSegment
+from push_model.pushable_sides import pushable_sides
 from push_model.settings import SettingsError, from_mapping
 from push_model.shape_specs import shape_from_mapping
 from push_model.shapes import Shape, Side, ellipse, flower, polygon, rectangle
@@ -55,6 +56,7 @@ __all__ = [
     "lynch_mason_stable",
     "point_velocity_to_twist",
     "polygon",
+    "pushable_sides",
     "rectangle",
     "rotation",
     "se2",

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from push_model.arrays import Array
+from push_model.outlines import convex_hull, inside_convex
 from push_model.settings import bounded, settings
 
 _RING_CORNERS = 32
@@ -34,7 +35,11 @@ class FlatBumper:
         angle = np.linspace(math.pi / 2.0, 1.5 * math.pi, 13)
         back = body_radius * np.column_stack([np.cos(angle), np.sin(angle)])
         d, w = self.distance, self.width / 2.0
-        return np.vstack([back, [[d, -w], [d, w]]])
+        outline = np.vstack([back, [[d, -w], [d, w]]])
+        front = back[1:-1] * [-1.0, 1.0]
+        if not inside_convex(outline, front).all():  # the body bulges beyond a narrow bumper
+            outline = convex_hull(np.vstack([outline, front]))
+        return outline
 
 
 @settings

@@ -65,9 +65,7 @@ def overlap(first: Array, second: Array) -> bool:
         return False
     if _edges_cross(first, second):
         return True
-    # No edges cross: one holds the other, or they are apart. A corner may lie on the other's line,
-    # where neither is said; the middles of edges and the corners are not all there.
-    return bool(_some_inside(first, second) or _some_inside(second, first))
+    return _borders(first, second) or _borders(second, first)
 
 
 def overlaps_disc(outline: Array, centre: Array, radius: float) -> bool:
@@ -105,13 +103,36 @@ def _edges_cross(first: Array, second: Array) -> bool:
         left: Array = (q[..., 0] - p[..., 0]) * (r[..., 1] - p[..., 1])
         return left - (q[..., 1] - p[..., 1]) * (r[..., 0] - p[..., 0])
 
-    apart = (turn(a, b, c) * turn(a, b, d) < 0.0) & (turn(c, d, a) * turn(c, d, b) < 0.0)
-    return bool(apart.any())
+    # Corners on a line, but for rounding, touch it.
+    small = 1e-12 * float(np.ptp(np.vstack([first, second]), axis=0).max()) ** 2
+
+    def apart(one: Array, other: Array) -> Mask:
+        return (np.minimum(one, other) < -small) & (np.maximum(one, other) > small)
+
+    cross = apart(turn(a, b, c), turn(a, b, d)) & apart(turn(c, d, a), turn(c, d, b))
+    return bool(cross.any())
 
 
-def _some_inside(outline: Array, other: Array) -> bool:
-    points = np.vstack([other, 0.5 * (other + np.roll(other, -1, axis=0)), other.mean(axis=0)])
-    held = inside(outline, points)
-    size = float(np.ptp(outline, axis=0).max())
-    held[-1] &= bool(inside(other, points[-1:])[0])
-    return bool((held & (distance(outline, points) > 1e-12 * size)).any())
+def _borders(outline: Array, other: Array) -> bool:
+    """Whether an edge of the second outline bounds what both have in common.
+
+    For outlines whose edges do not cross: each edge is cut where a corner of the first lies on it,
+    and it is asked whether a point just inside of each piece lies in the first.
+    """
+    small = 1e-9 * float(np.ptp(outline, axis=0).max())
+    a, b = other, np.roll(other, -1, axis=0)
+    edge = b - a
+    length = np.hypot(*edge.T)
+    turn = np.sign(a[:, 0] @ b[:, 1] - a[:, 1] @ b[:, 0])  # +1 counter-clockwise
+    inward = turn * np.column_stack([-edge[:, 1], edge[:, 0]]) / length[:, None]
+    to = outline[None] - a[:, None]
+    along = (to * edge[:, None]).sum(axis=2) / length[:, None] ** 2
+    on = np.abs((to * inward[:, None]).sum(axis=2)) <= small
+    points = []
+    for i in range(len(other)):
+        cuts = along[i][on[i] & (along[i] > 0.0) & (along[i] < 1.0)]
+        shares = np.array([0.0, *np.sort(cuts), 1.0])
+        long = np.diff(shares) * length[i] > 10.0 * small  # pieces, not corners that coincide
+        middles = (0.5 * (shares[1:] + shares[:-1]))[long]
+        points.append(a[i] + middles[:, None] * edge[i] + 2.0 * small * inward[i])
+    return bool(inside(outline, np.vstack(points)).any())

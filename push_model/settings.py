@@ -22,6 +22,7 @@ import pydantic
 import pydantic.dataclasses
 from annotated_types import Ge, Le
 from pydantic import AllowInfNan, BeforeValidator, Strict
+from pydantic_core import core_schema
 
 from push_model.settings_errors import SettingsError, explained
 
@@ -48,19 +49,44 @@ def bounded(
     return dataclasses.field(default=default, metadata=metadata)
 
 
-def told_by_key(*kinds: str) -> BeforeValidator:
-    """Lets ``{rectangle: {...}}`` say ``{kind: rectangle, ...}``; put it in ``Annotated``."""
+@dataclasses.dataclass(frozen=True)
+class _ToldByKey:
+    kinds: tuple[str, ...]
 
-    def told_by_kind(value: Any) -> Any:
+    def by_kind(self, value: Any) -> Any:
         if isinstance(value, Mapping) and "kind" not in value:
             kind, inner = next(iter(value.items()), (None, None))
-            if len(value) == 1 and kind in kinds and isinstance(inner, Mapping):
+            if len(value) == 1 and kind in self.kinds and isinstance(inner, Mapping):
                 return {**inner, "kind": kind}
         elif isinstance(value, Mapping) or dataclasses.is_dataclass(value):
             return value
-        raise SettingsError(f"expected one key of {', '.join(kinds)} with a mapping, got {value!r}")
+        known = ", ".join(self.kinds)
+        raise SettingsError(f"expected one key of {known} with a mapping, got {value!r}")
 
-    return BeforeValidator(told_by_kind)
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: pydantic.GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        return core_schema.no_info_before_validator_function(self.by_kind, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: pydantic.GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        union = handler(schema)
+        keyed = [
+            {
+                "type": "object",
+                "properties": {kind: {"$ref": reference}},
+                "required": [kind],
+                "additionalProperties": False,
+            }
+            for kind, reference in union["discriminator"]["mapping"].items()
+        ]
+        return {"anyOf": [*keyed, union]}
+
+
+def told_by_key(*kinds: str) -> Any:
+    """Lets ``{rectangle: {...}}`` say ``{kind: rectangle, ...}``; put it in ``Annotated``."""
+    return _ToldByKey(kinds)
 
 
 @typing.dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field,))

@@ -41,6 +41,9 @@ def explained(
 
 def _line(error: Any, cls: type[Any], values: Any, where: str) -> str:
     kind, value, context = error["type"], error["input"], error.get("ctx", {})
+    if error["loc"] and error["loc"][-1] == "[key]":
+        path, _, _ = _place(cls, values, where, error["loc"][:-2])
+        return f"{path}: a key must be text, got {value!r}"
     absent = kind in ("missing", "unexpected_keyword_argument")
     parts = error["loc"][:-1] if absent else error["loc"]
     path, hint, field = _place(cls, values, where, parts)
@@ -142,4 +145,8 @@ def _kinds(hint: Any) -> dict[Any, Any]:
 
 
 def _name(hint: Any) -> str:
+    if _kinds(hint):
+        return f"a mapping of kind {' or '.join(sorted(_kinds(hint)))}"
+    if dataclasses.is_dataclass(hint):
+        return "a mapping"
     return str(getattr(hint, "__name__", hint))

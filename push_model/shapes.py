@@ -17,13 +17,21 @@ from push_model.settings import SettingsError
 class Side:
     """A flat side of an object, in the object frame.
 
-    index: number of the side; it starts at outline vertex ``index``.
+    index: number of the side; it starts at outline vertex ``index``. One that spans a recess of a
+        concave outline of n vertices has n added.
     start, end: ``(2,)`` [m] its ends, counter-clockwise.
+    supports: [m] along it, from and to, where there is something to push on, e.g. the two tips of a
+        U; everywhere when empty.
+    room: [m] along it, from and to, where the middle of the bumper fits; everywhere when None.
+    depth: [m] that the object reaches back beside the pusher, which must back out so far.
     """
 
     index: int
     start: Array
     end: Array
+    supports: tuple[tuple[float, float], ...] = ()
+    room: tuple[float, float] | None = None
+    depth: float = 0.0
 
     @property
     def length(self) -> float:
@@ -52,6 +60,12 @@ class Side:
     def distance(self) -> float:
         """[m] from the side to the centre of mass."""
         return float(-self.start @ self.inward_normal)
+
+    def touched(self, low: float, high: float) -> tuple[float, float] | None:
+        """[m] along the side, the ends of what a bumper from ``low`` to ``high`` touches."""
+        supports = self.supports or ((0.0, self.length),)
+        parts = [(max(a, low), min(b, high)) for a, b in supports if a <= high and b >= low]
+        return (parts[0][0], parts[-1][1]) if parts else None
 
 
 @dataclass(frozen=True)
@@ -192,17 +206,18 @@ def _centroid(points: Array) -> Array:
 
 
 def _crosses_itself(points: Array) -> bool:
+    """Whether two sides that are no neighbours meet; sides on one line may lie apart."""
     n = len(points)
     ends = np.roll(points, -1, axis=0)
+    a, b, c, d = points[:, None], ends[:, None], points[None], ends[None]
 
-    def turn(a: Array, b: Array, c: Array) -> float:
-        return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+    def turn(p: Array, q: Array, r: Array) -> Array:
+        left: Array = (q[..., 0] - p[..., 0]) * (r[..., 1] - p[..., 1])
+        return left - (q[..., 1] - p[..., 1]) * (r[..., 0] - p[..., 0])
 
-    for i in range(n):
-        for j in range(i + 1, n):
-            if j == i + 1 or (i == 0 and j == n - 1):
-                continue
-            a, b, c, d = points[i], ends[i], points[j], ends[j]
-            if turn(a, b, c) * turn(a, b, d) <= 0.0 and turn(c, d, a) * turn(c, d, b) <= 0.0:
-                return True
-    return False
+    meet = (turn(a, b, c) * turn(a, b, d) <= 0.0) & (turn(c, d, a) * turn(c, d, b) <= 0.0)
+    low, high = np.minimum(points, ends), np.maximum(points, ends)
+    meet &= (low[:, None] <= high[None]).all(axis=2) & (low[None] <= high[:, None]).all(axis=2)
+    i, j = np.nonzero(meet)
+    apart = (j - i) % n
+    return bool(((apart > 1) & (apart < n - 1)).any())

@@ -69,16 +69,21 @@ def contact_on_side(side: Side, pusher_width: float, along: float | None = None)
     pusher_width: [m] of the flat bumper.
     along: [m] position of the bumper's middle from the side's start. By default the point of the
         side that is closest to the centre of mass, moved inward so that the bumper reaches beyond
-        neither end of a side that is longer than the bumper.
+        neither end of a side that is longer than the bumper, and to where it has room.
     """
     foot = float(-side.start @ side.tangent)  # of the centre of mass, along the side
     if along is None:
         rim = min(pusher_width / 2.0, side.length / 2.0)
         along = min(max(foot, rim), side.length - rim)
+        if side.room is not None:
+            along = min(max(along, side.room[0]), side.room[1])
     # Pusher x is the inward normal, so pusher y is minus the side's direction.
     half = pusher_width / 2.0
     left = min(along, half)
     right = -min(side.length - along, half)
+    if side.supports:
+        low, high = side.touched(along - half, along + half) or (along, along)
+        left, right = along - low, along - high
     if right >= left:
         raise ValueError(f"the bumper does not touch side {side.index}")
     return PusherContact(np.array([side.distance, along - foot]), right, left, -side.heading)

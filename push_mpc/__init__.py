@@ -1,34 +1,25 @@
-"""LTV-MPC for pushing and for moving alone (sections 2.4.1-2.4.5, 2.4.7)."""
+"""Predictive controllers for pushing and for moving alone, and the tracker around them (2.4)."""
 
-from push_mpc.ltv_mpc import LtvMpc, MpcResult, Reference
-from push_mpc.qp import (
-    ActiveSetBackend,
-    DaqpBackend,
-    OsqpBackend,
-    Qp,
-    QpBackend,
-    QpSolution,
-    backend,
-)
+from push_mpc.controller import MpcResult, PredictiveController, Reference
+from push_mpc.controllers import CONTROLLERS, ControllerKind, controller_kind
+from push_mpc.ltv_mpc import LtvMpc
 from push_mpc.settings import MpcSettings, TrackerSettings
-from push_mpc.tracker import Push, Task, Tick, TrackError, TrajectoryTracker
+from push_mpc.task import Push, Task, Tick, TrackError
+from push_mpc.tracker import TrajectoryTracker
 
 __all__ = [
-    "ActiveSetBackend",
-    "DaqpBackend",
+    "CONTROLLERS",
+    "ControllerKind",
     "LtvMpc",
     "MpcResult",
     "MpcSettings",
-    "OsqpBackend",
+    "PredictiveController",
     "Push",
-    "Qp",
-    "QpBackend",
-    "QpSolution",
     "Reference",
     "Task",
     "Tick",
     "TrackError",
     "TrackerSettings",
     "TrajectoryTracker",
-    "backend",
+    "controller_kind",
 ]

@@ -2,43 +2,16 @@
 
 import math
 import time
-from dataclasses import dataclass
 
 import numpy as np
 
 from push_model.arrays import Array
 from push_model.kinematics import DifferentialDrive
 from push_model.stable_push import CurvatureLimits
-from push_mpc.prediction import OUTPUTS, SLACKS, condense, constant_rows, tick_rows
-from push_mpc.qp import Qp, QpBackend, backend
+from push_mpc.controller import MpcResult, Reference
+from push_mpc.prediction import OUTPUTS, SLACKS, SOFTENED, condense, constant_rows, tick_rows
 from push_mpc.settings import MpcSettings
-
-
-@dataclass(frozen=True)
-class Reference:
-    """What to track over the horizon.
-
-    pose: ``(p + 1, 3)`` world frame; twist: ``(p + 1, 3)`` v_d, w_d, omega_d of that frame, in it.
-    """
-
-    pose: Array
-    twist: Array
-
-
-@dataclass(frozen=True)
-class MpcResult:
-    """acceleration: (a, epsilon) to apply now; slack: greatest violation; solve_time [s] CPU.
-
-    solved is False when the acceleration must not be used; reason says why. late: only because it
-    came after its deadline.
-    """
-
-    acceleration: tuple[float, float]
-    solved: bool
-    slack: float
-    solve_time: float
-    reason: str
-    late: bool = False
+from push_qp import Qp, QpBackend, backend
 
 
 class LtvMpc:
@@ -53,8 +26,35 @@ class LtvMpc:
         self._Q = np.array(settings.state_weight)
         self._P = settings.terminal_factor * self._Q
         self._R, self._Rd = np.array(settings.input_weight), np.array(settings.input_rate_weight)
+        self._max_slack = np.array(
+            [settings.max_wheel_slack, settings.max_curvature_slack, settings.max_obstacle_slack]
+        )
         self._rollout = np.zeros((settings.horizon + 1, 5))
         self._qp = self._programme()
+        self.reset()
+
+    @property
+    def horizon(self) -> int:
+        """See PredictiveController."""
+        return self.settings.horizon
+
+    @property
+    def step(self) -> float:
+        """See PredictiveController."""
+        return self.settings.step
+
+    @property
+    def max_obstacles(self) -> int:
+        """See PredictiveController."""
+        return self.settings.max_obstacles
+
+    def warm_up(self) -> None:
+        """See PredictiveController."""
+        p = self.settings.horizon
+        still = Reference(np.zeros((p + 1, 3)), np.zeros((p + 1, 3)))
+        circles = np.array([[1.0, 0.0, 0.5]])[: self.settings.max_obstacles]
+        self.solve(np.full(5, 1e-3), still, CurvatureLimits(-1.0, 1.0), circles)
+        self.solve(np.full(5, 1e-3), still, None, np.zeros((0, 3)))
         self.reset()
 
     def _programme(self) -> Qp:
@@ -76,7 +76,8 @@ class LtvMpc:
         change = np.array([s.max_acceleration_change, s.max_turn_acceleration_change])
         normal, bound, family = constant_rows(p, s.max_obstacles, self.drive.half_track, change)
         width = 2 * np.arange(1, p + 1, dtype=np.int64)
-        return Qp(H, f, low, high, S, np.zeros((p, OUTPUTS)), width, normal, bound, family)
+        equal = np.zeros(len(family), dtype=np.bool_)
+        return Qp(H, f, low, high, S, np.zeros((p, OUTPUTS)), width, normal, bound, family, equal)
 
     def reset(self) -> None:
         """Forget the previous solution."""
@@ -87,18 +88,11 @@ class LtvMpc:
     def solve(
         self, error: Array, reference: Reference, limits: CurvatureLimits | None, circles: Array
     ) -> MpcResult:
-        """One step.
-
-        Parameters
-        ----------
-        error: ``(5,)`` of (2.37).
-        reference: over the horizon, first sample now.
-        limits: stable curvatures now, in a push; None when the robot moves alone.
-        circles: ``(m, 3)`` x, y, least distance of the axle midpoint; m <= max_obstacles.
+        """See PredictiveController.
 
         Raises
         ------
-        ValueError: more circles than that.
+        ValueError: more circles than max_obstacles.
         """
         started = time.thread_time()
         # a sum is finite only if every term is
@@ -110,14 +104,22 @@ class LtvMpc:
             return self._failed(result.status, started)
         p = self.settings.horizon
         u = result.z[: 2 * p].reshape(p, 2)
-        slack = float(result.z[2 * p :].max())
-        if slack > self.settings.max_slack:
-            return self._failed(f"constraints violated by {slack:.3g}", started)
+        part = result.z[2 * p :] / self._max_slack
+        worst = int(part.argmax())
+        if part[worst] > 1.0:
+            kind, unit = SOFTENED[worst]
+            return self._failed(
+                f"{kind} violated by {result.z[2 * p + worst]:.3g} {unit}, at most "
+                f"{self._max_slack[worst]:g} {unit} is tolerated",
+                started,
+            )
         # The tick is far shorter than a step: linearise about the same inputs next time.
         self._nominal = u.copy()
         self._previous = u[0].copy()
         cpu = time.thread_time() - started
-        return MpcResult((float(u[0, 0]), float(u[0, 1])), True, slack, cpu, "")
+        return MpcResult(
+            (float(u[0, 0]), float(u[0, 1])), True, max(float(part[worst]), 0.0), cpu, ""
+        )
 
     def programme(
         self, error: Array, reference: Reference, limits: CurvatureLimits | None, circles: Array

@@ -1,6 +1,7 @@
 """The controller node: follows trajectories with the LTV-MPC, driven by the pose stream."""
 
 import math
+import sys
 from typing import Any
 
 import numpy as np
@@ -11,16 +12,14 @@ from std_msgs.msg import Header
 
 from push_estimation.pose_gate import PoseGateSettings, Stamp
 from push_model.arrays import Array
-from push_model.kinematics import unicycle_step
 from push_model.settings import SettingsError
 from push_mpc import (
-    LtvMpc,
-    MpcSettings,
     Push,
     Task,
     Tick,
     TrackerSettings,
     TrajectoryTracker,
+    controller_kind,
 )
 from push_msgs.action import FollowTrajectory
 from push_msgs.msg import ControllerStatus
@@ -36,6 +35,7 @@ from push_ros.heartbeat import HeartbeatWatch
 from push_ros.names import inside, names_of_robot
 from push_ros.parameters import declare_settings
 from push_ros.pose_feed import Frame, PoseFeed
+from push_ros.process import run_node
 from push_ros.qos import COMMAND, STATUS
 from push_ros.validation import FRAME, InvalidMessage, check_frame, finite, planar_pose
 from push_scenario.scenario import Scenario, load_scenario
@@ -60,13 +60,16 @@ class ControllerNode(Node):
         names = names_of_robot(self, self.robot)
         values = dict(self._scenario.parameters.get("controller", {}))
         sections = {k: values.pop(k, {}) for k in ("mpc", "tracker", "poses")}
+        default = str(values.pop("controller", "ltv"))
         if values:
             raise SettingsError(
-                f"controller: unknown key '{next(iter(values))}'; expected mpc, tracker or poses"
+                f"controller: unknown key '{next(iter(values))}'; expected controller, mpc, "
+                "tracker or poses"
             )
         self._drive = spec.differential
+        self._kind = controller_kind(str(self.declare_parameter("controller", default).value))
         self._mpc_settings = declare_settings(
-            self, MpcSettings, sections["mpc"], "mpc", "controller.mpc", self._apply_mpc
+            self, self._kind.settings, sections["mpc"], "mpc", "controller.mpc", self._apply_mpc
         )
         self._tracker_settings = declare_settings(
             self,
@@ -104,7 +107,7 @@ class ControllerNode(Node):
             self,
             FollowTrajectory,
             names.robot(self.robot, "follow_trajectory"),
-            check=self._parse,
+            check=self._check,
             start=self._begin,
             cancel=self._canceled,
             preempt=lambda request: self._preempt(),
@@ -120,7 +123,7 @@ class ControllerNode(Node):
         if self.tracker.active:
             raise SettingsError("the controller is busy; change its parameters when it is idle")
 
-    def _apply_mpc(self, settings: MpcSettings) -> None:
+    def _apply_mpc(self, settings: Any) -> None:
         self._busy()
         self._mpc_settings = settings
         self._rebuild()
@@ -132,9 +135,13 @@ class ControllerNode(Node):
 
     def _rebuild(self) -> None:
         self.tracker = TrajectoryTracker(
-            self._tracker_settings, LtvMpc(self._mpc_settings, self._drive)
+            self._tracker_settings, self._kind.make(self._mpc_settings, self._drive)
         )
         self.tracker.warm_up()
+
+    def _check(self, request: Any) -> None:
+        """Raise InvalidMessage unless the goal is a task."""
+        self._parse(request)
 
     def _parse(self, request: Any) -> tuple[Task, float]:
         """A task from a goal; raises InvalidMessage."""
@@ -205,7 +212,7 @@ class ControllerNode(Node):
             if self.tracker.active:
                 self._end(FollowTrajectory.Result.CLOCK_RESET, "the clock went back")
         if frame.verdict is Stamp.RESUMED:
-            self.tracker.v = self.tracker.omega = 0.0
+            self.tracker.halt()
         self._step(frame.elapsed or _TICK, frame.seen)
 
     def _step(self, dt: float, seen: frozenset[str]) -> None:
@@ -213,6 +220,7 @@ class ControllerNode(Node):
         if tracker.active and self._heartbeat.lost:
             self._end(FollowTrajectory.Result.PREEMPTED, "the supervisor is gone")
         if not tracker.active:
+            tracker.rest(dt)
             self._publish_command(0.0, 0.0)
             self._publish_status(None)
             return
@@ -224,9 +232,8 @@ class ControllerNode(Node):
             return
         self._held = 0.0
         age = self._poses.gate.age(self.robot)
-        if age > 0.0:  # dead reckoning over a drop-out
-            robot = unicycle_step(robot, tracker.v, tracker.omega, age)
-        tick = tracker.tick(dt, robot, item if self._object in seen else None, self._bodies())
+        item = item if self._object in seen else None
+        tick = tracker.tick(dt, robot, item, self._bodies(), age)
         self._publish_command(tick.v, tick.omega)
         failed = tick.solve is not None and not tick.solve.solved
         self._mode = (
@@ -249,7 +256,7 @@ class ControllerNode(Node):
 
     def _hold(self, dt: float, missing: str) -> None:
         """Stand still while a pose that the task needs is missing; give up after a while."""
-        self.tracker.v = self.tracker.omega = 0.0
+        self.tracker.rest(dt)
         self._mode = ControllerStatus.HOLD
         self._reason = f"no valid pose of {missing}"
         self._held += dt
@@ -309,7 +316,7 @@ class ControllerNode(Node):
         silence = self._poses.silence
         if not self.tracker.active or silence < 2.0 * self._poses.gate.settings.timeout:
             return
-        self.tracker.v = self.tracker.omega = 0.0
+        self.tracker.halt()
         self._publish_command(0.0, 0.0)
         if silence > _GIVE_UP:
             self._end(FollowTrajectory.Result.POSES_STALE, f"no poses for {silence:.1f} s")
@@ -329,3 +336,12 @@ class ControllerNode(Node):
             "pose jumps": self._poses.gate.jumps,
             "warning": "poses are stale" if stale else "",
         }
+
+
+def main() -> int:
+    """Entry point of the process: ``--ros-args`` on its command line."""
+    return run_node(ControllerNode)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

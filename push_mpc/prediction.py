@@ -21,8 +21,10 @@ from numpy.typing import NDArray
 
 from push_model.arrays import Array
 
-SLACKS = 3
-"""Softened families: wheel speeds, curvature, obstacles."""
+SOFTENED = (("wheel speed", "m/s"), ("stable curvature", "rad/s"), ("obstacle", "m"))
+"""Families of rows with a slack in common, and its unit."""
+
+SLACKS = len(SOFTENED)
 
 OUTPUTS = 7
 """e_x, e_y, e_theta, e_v, e_omega after the step, and the change of the two inputs before it."""

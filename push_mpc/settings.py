@@ -7,7 +7,14 @@ from push_model.settings import SettingsError, bounded, settings
 
 @settings
 class MpcSettings:
-    """Names follow section 2.4.5."""
+    """Names follow section 2.4.5.
+
+    A softened row may be violated by its kind's ``max_..._slack``; beyond, the robot stops. With
+    the noise of a motion capture the violation of a job that goes well is zero, so the bounds say
+    what is still harmless. Wheels saturate anyway. 0.02 rad/s is what ``friction_trust`` leaves of
+    an e-puck's curvature at the speed of a push. 5 mm are more than noise and dead reckoning
+    displace a robot by, and less than the 8 mm that the supervisor adds to the circles.
+    """
 
     step: float = bounded(0.1, low=0.01, high=1.0, doc="[s] T_s of the prediction")
     horizon: int = bounded(20, low=2, high=100, doc="p, steps predicted")
@@ -24,7 +31,18 @@ class MpcSettings:
     max_obstacles: int = bounded(20, low=0, high=200, doc="nearest obstacles in the QP")
     slack_linear: float = bounded(1000.0, low=0.0, high=1e6, doc="price of a softened row")
     slack_quadratic: float = bounded(20000.0, low=1e-3, high=1e8, doc="price of a softened row")
-    max_slack: float = bounded(0.3, low=0.0, high=100.0, doc="violation that counts as infeasible")
+    max_wheel_slack: float = bounded(
+        0.01,
+        low=1e-6,
+        high=100.0,
+        doc="[m/s] of a wheel beyond its limit that is tolerated",
+    )
+    max_curvature_slack: float = bounded(
+        0.02, low=1e-6, high=100.0, doc="[rad/s] beyond the stable curvature that is tolerated"
+    )
+    max_obstacle_slack: float = bounded(
+        0.005, low=1e-6, high=100.0, doc="[m] inside an obstacle's circle that is tolerated"
+    )
     backend: Literal["active_set", "daqp", "osqp"] = "active_set"
 
     def __post_init__(self) -> None:
@@ -46,14 +64,25 @@ class TrackerSettings:
     orientation_tolerance: float = bounded(0.03, low=1e-4, high=3.2, doc="[rad] at the end")
     settle_time: float = bounded(3.0, low=0.0, high=60.0, doc="[s] to reach the tolerance")
     grasp_filter: float = bounded(0.2, low=0.0, high=10.0, doc="[s] time constant, object in robot")
+    rest_speed: float = bounded(0.01, low=1e-4, high=1.0, doc="[m/s] that counts as at rest")
+    rest_turn_rate: float = bounded(0.1, low=1e-3, high=10.0, doc="[rad/s] that counts as at rest")
     lag_begin: float = bounded(0.02, low=1e-3, high=1.0, doc="[m] lag that slows the reference")
     lag_end: float = bounded(0.06, low=2e-3, high=1.0, doc="[m] lag that halts the reference")
     contact_gap: float = bounded(0.015, low=1e-3, high=1.0, doc="[m] object to bumper")
+    contact_aside: float = bounded(
+        0.045, low=1e-3, high=1.0, doc="[m] object along the bumper, from its place"
+    )
     contact_turn: float = bounded(0.25, low=0.01, high=3.2, doc="[rad] object against bumper")
     contact_time: float = bounded(0.5, low=0.0, high=10.0, doc="[s] until contact counts as lost")
     off_course: float = bounded(0.08, low=1e-3, high=5.0, doc="[m] from the reference")
     deadline: float = bounded(
         0.0, low=0.0, high=10.0, doc="[s] wall time a solve may take in live use; 0: not watched"
+    )
+    solver_patience: int = bounded(
+        10, low=1, high=10000, doc="failed or late solves in a row that end the task"
+    )
+    fade_time: float = bounded(
+        0.1, low=1e-3, high=10.0, doc="[s] in which the command fades to zero while solves are late"
     )
     stuck_time: float = bounded(1.5, low=0.1, high=60.0, doc="[s] commanded but not moving")
     stuck_way: float = bounded(0.03, low=1e-3, high=1.0, doc="[m] commanded in that time")

@@ -53,7 +53,7 @@ class NoGuidePath(Exception):
         self.widest = widest
 
 
-class _Validity(ob.StateValidityChecker):  # type: ignore[misc]
+class _Validity(ob.StateValidityChecker):
     def __init__(
         self, information: ob.SpaceInformation, field: DistanceField, ends: Array, least: float
     ):
@@ -69,7 +69,7 @@ class _Validity(ob.StateValidityChecker):  # type: ignore[misc]
         return bool(room >= self._least - slack_at(self._ends, u, v))
 
 
-class _Motion(ob.MotionValidator):  # type: ignore[misc]
+class _Motion(ob.MotionValidator):
     def __init__(
         self, information: ob.SpaceInformation, field: DistanceField, ends: Array, least: float
     ):

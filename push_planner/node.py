@@ -1,6 +1,7 @@
 """The planner node: the PlanPush action and the PlanRobotPath service."""
 
 import math
+import sys
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -39,6 +40,7 @@ from push_ros.conversions import (
 from push_ros.diagnostics import Diagnostics
 from push_ros.names import names_of
 from push_ros.parameters import declare_settings
+from push_ros.process import run_node
 from push_ros.qos import LATCHED
 from push_ros.validation import FRAME, InvalidMessage, planar_pose
 from push_scenario.scenario import Scenario, load_scenario
@@ -47,7 +49,7 @@ _SIGN_OF_LIFE = 0.5  # [s] wall time between feedback messages at most
 _MAP_PATIENCE = 5.0  # [s] wall time that a request waits for the first map
 
 
-class PlannerNode(Node):  # type: ignore[misc]
+class PlannerNode(Node):
     """Plans in slices between which its executor serves others, so that a goal can be cancelled."""
 
     def __init__(
@@ -294,3 +296,12 @@ class PlannerNode(Node):  # type: ignore[misc]
             "last plan time": f"{self.last_time:.3f} s",
             "warning": "" if self._grid is not None else "no map yet",
         }
+
+
+def main() -> int:
+    """Entry point of the process: ``--ros-args`` on its command line."""
+    return run_node(PlannerNode)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

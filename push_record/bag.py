@@ -176,9 +176,25 @@ def _records(bag: Path) -> Iterator[Any]:
             return
 
 
+@dataclass(frozen=True)
+class RawRecord:
+    """A message of a bag as it was sent: topic, type, log time [ns], CDR bytes."""
+
+    topic: str
+    type: str
+    stamp: int
+    data: bytes
+
+
 def read_bag(bag: Path, topics: set[str] | None = None) -> Iterator[Record]:
     """Messages in file order; a bag whose writer was killed gives what its whole chunks hold."""
     store = typestore()
+    for raw in read_raw(bag, topics):
+        yield Record(raw.topic, raw.stamp, store.deserialize_cdr(raw.data, raw.type))
+
+
+def read_raw(bag: Path, topics: set[str] | None = None) -> Iterator[RawRecord]:
+    """As ``read_bag``, without deserialising."""
     schemas: dict[int, str] = {}
     channels: dict[int, tuple[str, str]] = {}
     for record in _records(bag):
@@ -189,7 +205,7 @@ def read_bag(bag: Path, topics: set[str] | None = None) -> Iterator[Record]:
         elif isinstance(record, Message):
             topic, kind = channels[record.channel_id]
             if topics is None or topic in topics:
-                yield Record(topic, record.log_time, store.deserialize_cdr(record.data, kind))
+                yield RawRecord(topic, kind, record.log_time, record.data)
 
 
 def recover(bag: Path, folder: Path) -> int:

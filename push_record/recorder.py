@@ -1,77 +1,82 @@
-"""The recorder node: the suite's topics into a bag."""
+"""The recorder node: the topics of a world and its teams into a bag."""
 
-import subprocess
+import sys
 import time
 from pathlib import Path
-from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseStamped, TwistStamped
-from nav_msgs.msg import OccupancyGrid
-from nav_msgs.msg import Path as PathMessage
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
-from std_msgs.msg import Bool, Header, String
-from visualization_msgs.msg import MarkerArray
+from std_msgs.msg import String
 
-from push_msgs.msg import Contacts, ControllerStatus, JobState, Poses, PushPlan
+from push_model.settings import SettingsError
 from push_record.bag import BagWriter
+from push_record.revision import revision
+from push_record.topics import recorded_topics
 from push_ros.conversions import time_from_ros
-from push_ros.qos import CLOCK, COMMAND, LATCHED, STATUS, STREAM
-from push_scenario.scenario import Scenario
-from tf2_msgs.msg import TFMessage
+from push_ros.latched import hear_latched
+from push_ros.names import names_of
+from push_ros.process import run_node
+from push_ros.qos import CLOCK
+from push_scenario.scenario import Scenario, load_scenario, scenario_from_text
+
+_PATIENCE = 5.0  # [s] wall time that the scenario has to be heard
 
 
-def revision() -> str:
-    """The git revision of the source tree, with a mark when it was changed; empty without git."""
-    here = Path(__file__).resolve().parent
-    try:
-        text = subprocess.run(
-            ["git", "-C", str(here), "describe", "--always", "--dirty", "--abbrev=12"],
-            capture_output=True,
-            text=True,
-            timeout=5,
-            check=True,
-        ).stdout
-    except (OSError, subprocess.SubprocessError):
-        return ""
-    return text.strip()
+def heard_scenario(namespace: str = "", limit: float | None = None) -> Scenario:
+    """The scenario that the bridge of a namespace publishes.
+
+    Raises
+    ------
+    SettingsError: none is heard within limit [s] of wall time, a few seconds when it is not given;
+        says what to do.
+    """
+    topic = names_in(namespace)
+    message = hear_latched(String, topic, _PATIENCE if limit is None else limit)
+    if message is None:
+        raise SettingsError(
+            f"nobody publishes a scenario on {topic}; start a suite, or name it with --scenario"
+        )
+    return scenario_from_text(str(message.data), "scenario", topic)
 
 
-def topics(scenario: Scenario) -> dict[str, tuple[Any, Any]]:
-    """What is recorded: topic to message class and QoS."""
-    result: dict[str, tuple[Any, Any]] = {
-        "/clock": (Clock, CLOCK),
-        "/poses": (Poses, STREAM),
-        "/ground_truth/poses": (Poses, STREAM),
-        "/contacts": (Contacts, STREAM),
-        "/map": (OccupancyGrid, LATCHED),
-        "/goal_pose": (PoseStamped, COMMAND),
-        "/push_plan": (PushPlan, LATCHED),
-        "/push_path": (PathMessage, LATCHED),
-        "/job_state": (JobState, LATCHED),
-        "/status_text": (String, LATCHED),
-        "/paused": (Bool, LATCHED),
-        "/tf": (TFMessage, STATUS),
-        "/visualization": (MarkerArray, STATUS),
-        "/diagnostics": (DiagnosticArray, STATUS),
-    }
-    for robot in scenario.robots:
-        result[f"/{robot}/cmd_vel"] = (TwistStamped, COMMAND)
-        result[f"/{robot}/heartbeat"] = (Header, STREAM)
-        result[f"/{robot}/controller/status"] = (ControllerStatus, STATUS)
-    return result
-
-
-def _type_name(message: Any) -> str:
-    return f"{message.__module__.split('.')[0]}/msg/{message.__name__}"
+def names_in(namespace: str) -> str:
+    """Full name of the topic that a world's scenario is latched on."""
+    return f"/{namespace.strip('/')}/scenario".replace("//", "/")
 
 
 class RecorderNode(Node):
     """Writes raw messages as they come. Log time is sim time once a clock has been seen."""
 
-    def __init__(self, folder: Path, scenario: Scenario, seed: int) -> None:
-        super().__init__("recorder")
+    def __init__(
+        self,
+        folder: Path | None = None,
+        scenario: Scenario | None = None,
+        seed: int | None = None,
+        namespace: str = "",
+    ) -> None:
+        """Open the bag and listen.
+
+        Parameters
+        ----------
+        folder: of the bag, which must not be there yet; parameter ``out`` when it is not given.
+        scenario: what runs; parameter ``scenario``, a name or path, when it is not given; what is
+            published on ``scenario`` when that is empty.
+        seed: of the run; the scenario's when it is not given. namespace: the world's.
+
+        Raises
+        ------
+        FileExistsError: the folder is there. SettingsError: no scenario is known.
+        """
+        super().__init__("recorder", namespace=namespace)
+        names = names_of(self)
+        folder = Path(str(self.declare_parameter("out", str(folder or "bag")).value))
+        name = str(self.declare_parameter("scenario", "").value)
+        world = names.world_space
+        if scenario is None:
+            scenario = load_scenario(name) if name else heard_scenario(world)
+        if seed is None:
+            seed = int(scenario.parameters.get("bridge", {}).get("seed", 1))
+        self._clock_topic = names.world("clock")
         self.writer = BagWriter(
             folder,
             {
@@ -79,15 +84,20 @@ class RecorderNode(Node):
                 "scenario_name": scenario.name,
                 "seed": str(seed),
                 "revision": revision(),
+                "namespace": world,
             },
         )
         self._sim_time = 0
-        for topic, (message, qos) in topics(scenario).items():
-            self.writer.add_topic(topic, _type_name(message), qos is LATCHED)
+        for topic, kind in recorded_topics(scenario, world).items():
+            self.writer.add_topic(topic, kind.type_name, kind.latched)
             self.create_subscription(
-                message, topic, lambda data, t=topic: self._on_message(t, data), qos, raw=True
+                kind.message,
+                topic,
+                lambda data, t=topic: self._on_message(t, data),
+                kind.qos,
+                raw=True,
             )
-        self.create_subscription(Clock, "/clock", self._on_clock, CLOCK)
+        self.create_subscription(Clock, self._clock_topic, self._on_clock, CLOCK)
 
     def _on_clock(self, message: Clock) -> None:
         self._sim_time = round(1e9 * time_from_ros(message.clock))
@@ -95,7 +105,7 @@ class RecorderNode(Node):
     def _on_message(self, topic: str, data: bytes) -> None:
         if self.writer.closed:
             return
-        simulated = self._sim_time > 0 or self.count_publishers("/clock") > 0
+        simulated = self._sim_time > 0 or self.count_publishers(self._clock_topic) > 0
         try:
             self.writer.write(topic, self._sim_time if simulated else time.time_ns(), bytes(data))
         except OSError as error:  # e.g. the disk is full: what is written stays readable
@@ -106,3 +116,12 @@ class RecorderNode(Node):
         """Finish the bag too."""
         self.writer.close()
         super().destroy_node()
+
+
+def main() -> int:
+    """Entry point of the process: ``--ros-args`` on its command line."""
+    return int(run_node(RecorderNode))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

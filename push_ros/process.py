@@ -8,7 +8,7 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import IO, Any
 
@@ -70,6 +70,21 @@ def release_domain(domain: int) -> None:
     _claims.pop(domain).close()
 
 
+@contextlib.contextmanager
+def own_domain() -> Iterator[int]:
+    """A domain that nobody else on this machine has, while the block runs."""
+    before = os.environ.get("ROS_DOMAIN_ID")
+    domain = claim_domain()
+    try:
+        yield domain
+    finally:
+        release_domain(domain)
+        if before is None:
+            os.environ.pop("ROS_DOMAIN_ID", None)
+        else:
+            os.environ["ROS_DOMAIN_ID"] = before
+
+
 def heard(node: Node, publisher: Any, state_type: str = "push_msgs/msg/JobState") -> bool:
     """Whether what a publisher of the node sends now is heard by who owns the job.
 
@@ -88,11 +103,17 @@ def heard(node: Node, publisher: Any, state_type: str = "push_msgs/msg/JobState"
 
 
 class Spinner:
-    """An executor for some nodes, spun by its owner."""
+    """An executor for some nodes, spun by its owner.
 
-    def __init__(self, nodes: Sequence[Node]) -> None:
+    context: the one that the nodes were made in; the default one when it is not given.
+    """
+
+    def __init__(self, nodes: Sequence[Node], context: Any = None) -> None:
         self.nodes = list(nodes)
-        self.executor = EventsExecutor()
+        self._context = context
+        # It wants a standard error that is a file, which that of a notebook is not.
+        with contextlib.redirect_stderr(sys.__stderr__):
+            self.executor = EventsExecutor(context=context)
         for node in self.nodes:
             self.executor.add_node(node)
 
@@ -110,23 +131,25 @@ class Spinner:
         """Spin until the condition holds; False when it does not within limit [s] wall time."""
         end = time.monotonic() + limit
         while not condition():
-            if time.monotonic() > end or not rclpy.ok():
+            if time.monotonic() > end or not rclpy.ok(context=self._context):
                 return False
             self.once(0.05)
         return True
 
     def close(self) -> None:
-        """Destroy the nodes."""
+        """Destroy the nodes. An executor that is left open keeps them in the graph."""
         for node in self.nodes:
             self.executor.remove_node(node)
             with contextlib.suppress(Exception):
                 node.destroy_node()
         self.nodes.clear()
+        self.executor.shutdown()
 
 
 def run_node(make: Callable[[], Node], arguments: Sequence[str] | None = None) -> int:
     """Run one node until a signal; returns an exit code.
 
+    arguments: of the command line; those of this process when they are not given.
     SIGINT and SIGTERM end the spinning; the node's ``stop`` method, if it has one, is called while
     it can still publish.
     """
@@ -149,7 +172,7 @@ def run_node(make: Callable[[], Node], arguments: Sequence[str] | None = None) -
         stop = getattr(node, "stop", None)
         if stop is not None:
             stop()
-    except (SettingsError, ParameterException) as error:
+    except (SettingsError, ParameterException, FileExistsError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:

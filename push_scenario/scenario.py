@@ -278,10 +278,10 @@ def _refuse_twice(robots: list[str], objects: list[str], where: str) -> None:
 
 def _bodies_to_mapping(bodies: Mapping[str, tuple[Any, Array]]) -> dict[str, Any]:
     written: dict[Any, dict[str, Any]] = {}  # a type that many share is written once
-    return {
-        name: {"type": written.setdefault(spec, asdict(spec)), "start": to_value(start)}
-        for name, (spec, start) in bodies.items()
-    }
+    for spec, _ in bodies.values():
+        if spec not in written:
+            written[spec] = asdict(spec)
+    return {n: {"type": written[s], "start": to_value(p)} for n, (s, p) in bodies.items()}
 
 
 def _pick(name: str, known: Mapping[str, Any], kind: str) -> tuple[str, Any]:

@@ -2,26 +2,68 @@
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from typing import Any
 
+import numpy as np
 import rclpy
 from rclpy.logging import LoggingSeverity, set_logger_level
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
+from push_bringup.job_result import JobResult, result_of
+from push_bringup.monitor import Pose
+from push_bringup.suite import scenario_goals
+from push_bringup.systems import NodeSpec, nodes_of, teams_of
 from push_model.arrays import Array
-from push_mpc.node import ControllerNode
+from push_model.jobs import JobError
 from push_msgs.msg import JobState
-from push_planner.node import PlannerNode
+from push_ros.names import Names, space
 from push_ros.process import Spinner, claim_domain, prepare_environment
 from push_scenario.scenario import Scenario
 from push_study.observer import Observer
-from push_supervisor.node import SupervisorNode
-from sim_bridge.node import BridgeNode
+
+
+@dataclass
+class TeamRun:
+    """The nodes of a team, and who watches it."""
+
+    controller: Any
+    planner: Any
+    supervisor: Any
+    observer: Observer
+    _jobs: int = 0
+    _refusals: int = 0
+
+    def send_goal(self, goal: Array) -> None:
+        """Publish a goal ``(3,)``; ``ended`` is of its job."""
+        before = self.observer.state
+        assert before is not None, "the run has not been started"
+        self._jobs, self._refusals = int(before.job), int(before.refusals)
+        self.observer.send_goal(goal)
+
+    @property
+    def refused(self) -> bool:
+        """Whether a goal was refused since the last one was sent."""
+        state = self.observer.state
+        return state is not None and int(state.refusals) > self._refusals
+
+    @property
+    def ended(self) -> bool:
+        """Whether the job of the last goal has ended, or the goal was refused."""
+        state = self.observer.state
+        assert state is not None
+        begun = state.job > self._jobs and state.state == JobState.IDLE and not state.plan_ready
+        return bool(begun or self.refused)
 
 
 class LockstepRun:
-    """The graph of a scenario in this process. Use it as a context manager."""
+    """The graph of a scenario in this process. Use it as a context manager.
+
+    bridge: its node. teams: by name. controller, planner, supervisor, observer: of the first team.
+    """
 
     def __init__(
         self,
@@ -29,6 +71,8 @@ class LockstepRun:
         extra: Callable[[], list[Node]] | None = None,
         world: Scenario | None = None,
         quiet: bool = False,
+        system: str = "single",
+        namespace: str = "",
     ) -> None:
         """Make the nodes.
 
@@ -38,40 +82,44 @@ class LockstepRun:
         extra: makes further nodes, e.g. a recorder, once ROS is up.
         world: what the bridge simulates, when it differs from what is believed.
         quiet: log warnings only.
+        system: which nodes, see ``push_bringup.systems``. namespace: of the world.
         """
         prepare_environment()
         if quiet:
             set_logger_level("", LoggingSeverity.WARN)
         if "ROS_DOMAIN_ID" not in os.environ:
             claim_domain()
-        if not rclpy.ok():
-            rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-            self._owns_context = True
-        else:
-            self._owns_context = False
+        self._stack = ExitStack()
+        self.spinner: Spinner | None = None
         self.scenario = scenario.settings("bridge", lockstep=True)
         simulated = (world or scenario).settings("bridge", lockstep=True)
-        self.spinner: Spinner | None = None
+        specs = nodes_of(system, scenario, namespace)
+        if not rclpy.ok():
+            rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+            self._stack.callback(rclpy.try_shutdown)
         nodes: list[Node] = []
         try:
-            self.bridge = BridgeNode(simulated, autostart=False)
-            nodes.append(self.bridge)
-            self.controller = ControllerNode(self.scenario, self.scenario.robot()[0])
-            nodes.append(self.controller)
-            self.planner = PlannerNode(self.scenario)
-            nodes.append(self.planner)
-            self.supervisor = SupervisorNode(self.scenario)
-            nodes.append(self.supervisor)
-            self.observer = Observer(
-                self.supervisor.names, self.supervisor.robot, self.supervisor.object
-            )
-            nodes.append(self.observer)
+            made: dict[str, Any] = {}
+            for spec in specs:
+                made[spec.name] = spec.make(simulated if spec.kind == "bridge" else self.scenario)
+                nodes.append(made[spec.name])
+            self.bridge = made["bridge"]
+            self.teams: dict[str, TeamRun] = {}
+            for team in teams_of(scenario):
+                parts = {s.kind: s for s in specs if s.kind != "bridge" and s.team == team.name}
+                names = Names(space(namespace), space(parts["supervisor"].namespace))
+                observer = Observer(names, team.robots[0], team.object)
+                nodes.append(observer)
+                self.teams[team.name] = _team_run(made, parts, observer)
             nodes.extend(extra() if extra else [])
         except BaseException:
             for node in nodes:
                 node.destroy_node()
-            self._shutdown()
+            self._stack.close()
             raise
+        first = next(iter(self.teams.values()))
+        self.controller, self.planner = first.controller, first.planner
+        self.supervisor, self.observer = first.supervisor, first.observer
         self.spinner = Spinner(nodes)
 
     def __enter__(self) -> "LockstepRun":
@@ -84,23 +132,19 @@ class LockstepRun:
         """Destroy everything that this run made."""
         if self.spinner is not None:
             self.spinner.close()
-        self._shutdown()
-
-    def _shutdown(self) -> None:
-        if self._owns_context:
-            rclpy.try_shutdown()
+        self._stack.close()
 
     def connect(self, limit: float = 20.0) -> None:
         """Wait until all parts know each other; nothing moves before."""
         assert self.spinner is not None
+        teams = list(self.teams.values())
 
         def connected() -> bool:
             return (
-                self.supervisor.ready
-                and self.planner.ready
-                and len(self.bridge.commanded()) == 1
-                and self.bridge.heard_by(2)
-                and self.observer.connected
+                all(t.supervisor.ready and t.planner.ready for t in teams)
+                and len(self.bridge.commanded()) == len(teams)
+                and bool(self.bridge.heard_by(2 * len(teams)))
+                and all(t.observer.connected for t in teams)
             )
 
         if not self.spinner.until(connected, limit):
@@ -123,17 +167,47 @@ class LockstepRun:
         self.spinner.until(lambda: condition() or self.bridge.time > end, wall_limit)
         return condition()
 
-    def reach(self, goal: Array, sim_limit: float = 300.0) -> JobState | None:
-        """Send a goal and wait until its job ends; the state then, or None after sim_limit [s]."""
-        before = self.observer.state
-        assert before is not None, "the run has not been started"
-        jobs, refusals = int(before.job), int(before.refusals)
-        self.observer.send_goal(goal)
+    def reach(self, goal: Array, sim_limit: float = 300.0, team: str = "") -> JobState | None:
+        """Send a team a goal ``(3,)`` and wait until its job ends.
 
-        def ended() -> bool:
-            state = self.observer.state
-            assert state is not None
-            begun = state.job > jobs and state.state == JobState.IDLE and not state.plan_ready
-            return begun or state.refusals > refusals
+        Returns its state then, or None after sim_limit [s] of sim time.
+        """
+        run = self.teams[team] if team else next(iter(self.teams.values()))
+        run.send_goal(goal)
+        return run.observer.state if self.spin_until(lambda: run.ended, sim_limit) else None
 
-        return self.observer.state if self.spin_until(ended, sim_limit) else None
+    def reach_all(
+        self,
+        goals: Mapping[str, Pose] | None = None,
+        sim_limit: float = 300.0,
+    ) -> dict[str, JobResult]:
+        """Goals of several teams at once, each team's from the scenario when they are not given.
+
+        Errors are of the ground truth.
+        """
+        goals = scenario_goals(self.scenario) if goals is None else goals
+        begin = self.bridge.time
+        for name, goal in goals.items():
+            self.teams[name].send_goal(np.array(goal))
+        self.spin_until(lambda: all(self.teams[n].ended for n in goals), sim_limit)
+        return {n: self._result(n, goal, begin) for n, goal in goals.items()}
+
+    def _result(self, name: str, goal: Pose, begin: float) -> JobResult:
+        run = self.teams[name]
+        state, trace = run.observer.state, run.observer.trace
+        assert state is not None
+        pose = trace.object[-1] if trace.object else None
+        result = result_of(state, goal, pose, self.bridge.time - begin, name)
+        if run.refused:
+            code, reason = JobError(int(state.refusal_code)), f"goal refused: {state.refusal}"
+            return replace(result, code=code, reason=reason, refused=True)
+        return result if run.ended else replace(result, code=None)
+
+
+def _team_run(
+    made: Mapping[str, Any], parts: Mapping[str, NodeSpec], observer: Observer
+) -> TeamRun:
+    controller, planner, supervisor = (
+        made[parts[k].name] for k in ("controller", "planner", "supervisor")
+    )
+    return TeamRun(controller, planner, supervisor, observer)

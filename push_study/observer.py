@@ -34,7 +34,7 @@ class Observer(Node):
     """Watches a run from ground truth. For evaluation only: it commands nothing but the goal."""
 
     def __init__(self, names: Names, robot: str, item: str) -> None:
-        super().__init__("observer", namespace=names.team_space)
+        super().__init__("observer", namespace=names.team_space.rstrip("/"))
         self._robot, self._item = robot, item
         self.trace = Trace()
         self.state: JobState | None = None

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from push_study.trials import Row
+from push_study.pool import Row
 
 
 def aggregate(rows: list[Row]) -> dict[str, Any]:

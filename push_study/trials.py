@@ -1,29 +1,48 @@
 """Many trials through one executor: local processes, or a Dask cluster by address.
 
-Every finished trial is written down at once, so that an interrupted study keeps what it has.
+Every finished trial is written down at once, with what it was, so that a study that was interrupted
+goes on where it ended.
 """
 
+import dataclasses
 import json
-import multiprocessing
-import multiprocessing.connection
 import os
-import pickle
 import signal
-import subprocess
 import sys
 import threading
-import time
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
-from multiprocessing.connection import Connection
-from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
-from push_ros.process import die_with_parent
+from push_study.cluster import cluster_results
+from push_study.pool import Row, Trial, local_results
+from push_study.progress import Progress
 
-Row = dict[str, Any]
-Trial = Callable[[Any], Row]
+__all__ = ["Row", "Trial", "identity", "read_journal", "run_trials"]
+
+
+def identity(task: Any) -> str:
+    """What a task is, as JSON: all its fields but the folder ``out``, which may be moved."""
+    values = dataclasses.asdict(task)
+    values.pop("out", None)
+    return json.dumps({"trial": type(task).__name__, **values}, sort_keys=True)
+
+
+def read_journal(journal: Path) -> dict[str, Row]:
+    """Row by identity of every finished trial; a line that was cut off counts for nothing, and a
+    trial that crashed is not finished."""
+    rows: dict[str, Row] = {}
+    if not journal.is_file():
+        return rows
+    for line in journal.read_text(encoding="utf-8").splitlines():
+        try:
+            entry = json.loads(line)
+        except ValueError:
+            continue
+        if not entry["row"].get("crashed"):
+            rows[entry["task"]] = entry["row"]
+    return rows
 
 
 def run_trials(
@@ -34,32 +53,42 @@ def run_trials(
     Parameters
     ----------
     trial: importable function of one task; a raised exception becomes a failed row.
+    tasks: dataclasses. Those whose rows are in the journal are not run again.
     journal: JSON-lines file that each finished row is appended to.
     scheduler: address of a Dask scheduler; empty for local processes.
     workers: local processes; 0 for one a core.
     """
-    rows: dict[int, Row] = {}
-    started = time.monotonic()
     journal.parent.mkdir(parents=True, exist_ok=True)
-    with journal.open("w", encoding="utf-8") as file, ExitStack() as stack:
+    known = read_journal(journal)
+    keys = [identity(task) for task in tasks]
+    rows = {i: known[key] for i, key in enumerate(keys) if key in known}
+    open_tasks = [(i, task) for i, task in enumerate(tasks) if i not in rows]
+    _rewrite(journal, known)
+    with journal.open("a", encoding="utf-8") as file, ExitStack() as stack:
         stack.enter_context(_sigterm_as_interrupt())
+        progress = stack.enter_context(Progress(len(tasks), len(rows)))
+        results = (
+            cluster_results(trial, open_tasks, scheduler)
+            if scheduler
+            else local_results(trial, open_tasks, workers or os.cpu_count() or 1)
+        )
         try:
-            for index, row in stack.enter_context(
-                closing(_results(trial, tasks, scheduler, workers))
-            ):
+            for index, row in stack.enter_context(closing(results)):  # type: ignore[type-var]
                 rows[index] = row
-                file.write(json.dumps(row) + "\n")
+                file.write(json.dumps({"task": keys[index], "row": row}) + "\n")
                 file.flush()
-                mark = "ok  " if row.get("success") else "FAIL"
-                print(
-                    f"[{len(rows):3d}/{len(tasks)}] {mark} {row.get('scenario', '')} "
-                    f"seed {row.get('seed')}: {row.get('reason', '')} "
-                    f"({time.monotonic() - started:.0f} s)",
-                    flush=True,
-                )
+                progress.tell(row)
         except KeyboardInterrupt:
             print(f"interrupted: {len(rows)} of {len(tasks)} trials are kept", file=sys.stderr)
     return [rows[i] for i in sorted(rows)]
+
+
+def _rewrite(journal: Path, rows: dict[str, Row]) -> None:
+    """Leave whole lines of finished trials only."""
+    temporary = journal.with_suffix(".new")
+    lines = (json.dumps({"task": key, "row": row}) + "\n" for key, row in rows.items())
+    temporary.write_text("".join(lines), encoding="utf-8")
+    temporary.replace(journal)
 
 
 @contextmanager
@@ -77,114 +106,3 @@ def _sigterm_as_interrupt() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGTERM, before)
-
-
-def guarded(trial: Trial, task: Any) -> Row:
-    """The trial's row, or a failed row that names the exception."""
-    try:
-        return trial(task)
-    except Exception as error:
-        return _failed(task, f"{type(error).__name__}: {error}")
-
-
-def _failed(task: Any, reason: str) -> Row:
-    return {
-        "scenario": getattr(task, "scenario", ""),
-        "seed": getattr(task, "seed", None),
-        "success": False,
-        "reason": reason,
-    }
-
-
-def _results(
-    trial: Trial, tasks: Sequence[Any], scheduler: str, workers: int
-) -> Generator[tuple[int, Row], None, None]:
-    if scheduler:
-        try:
-            from dask.distributed import Client
-            from dask.distributed import as_completed as dask_completed
-        except ImportError:
-            raise SystemExit("--scheduler needs Dask: pip install distributed") from None
-        with Client(scheduler) as client:
-            futures = {
-                client.submit(_isolated, trial, t, pure=False): i for i, t in enumerate(tasks)
-            }
-            for future in dask_completed(futures):
-                index = futures[future]
-                error = future.exception()
-                yield (
-                    index,
-                    future.result() if error is None else _failed(tasks[index], repr(error)),
-                )
-        return
-    yield from _local_results(trial, tasks, workers or os.cpu_count() or 1)
-
-
-def _local_results(trial: Trial, tasks: Sequence[Any], workers: int) -> Iterator[tuple[int, Row]]:
-    """One process a trial: no state of ROS or PyBullet survives from one to the next."""
-    context = multiprocessing.get_context("spawn")
-    waiting = list(enumerate(tasks))[::-1]
-    running: dict[Connection, tuple[int, BaseProcess]] = {}
-    try:
-        while waiting or running:
-            while waiting and len(running) < workers:
-                index, task = waiting.pop()
-                receiver, sender = context.Pipe(duplex=False)
-                process = context.Process(target=_in_process, args=(sender, trial, task))
-                process.start()
-                sender.close()
-                running[receiver] = (index, process)
-            for ready in multiprocessing.connection.wait(list(running)):
-                assert isinstance(ready, Connection)
-                index, process = running.pop(ready)
-                try:
-                    row = ready.recv()
-                except (EOFError, OSError):
-                    _end(process)
-                    text = f"the trial's process died (exit code {process.exitcode})"
-                    row = _failed(tasks[index], text)
-                yield index, row
-                _end(process)
-    finally:
-        for _, process in running.values():
-            process.terminate()
-        for _, process in running.values():
-            process.join(2.0)
-            if process.is_alive():
-                process.kill()
-
-
-def _end(process: BaseProcess) -> None:
-    """Its row is here; it has a few seconds to tidy up."""
-    process.join(5.0)
-    if process.is_alive():
-        process.kill()
-        process.join()
-
-
-def _isolated(trial: Trial, task: Any) -> Row:
-    """The trial in a process of its own, from a Dask worker, which must not have children."""
-    done = subprocess.run(
-        [sys.executable, "-m", "push_study.trials"],
-        input=pickle.dumps((trial, task)),
-        stdout=subprocess.PIPE,
-        check=False,
-    )
-    if done.returncode != 0:
-        return _failed(task, f"the trial's process died (exit code {done.returncode})")
-    row: Row = pickle.loads(done.stdout)
-    return row
-
-
-def _in_process(sender: Connection, trial: Trial, task: Any) -> None:
-    """In a process of its own, which a key press does not reach and which outlives nobody."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    die_with_parent()
-    sender.send(guarded(trial, task))
-
-
-if __name__ == "__main__":  # a trial for _isolated: the task comes in, nothing but the row goes out
-    answer = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)
-    answer.write(pickle.dumps(guarded(*pickle.load(sys.stdin.buffer))))
-    answer.close()

@@ -1,5 +1,6 @@
 """The supervisor node: goals in, questions to planner and controller out, the job's state out."""
 
+import sys
 import time
 from typing import Any
 
@@ -22,6 +23,7 @@ from push_ros.job_intake import JobIntake
 from push_ros.names import names_of
 from push_ros.parameters import declare_settings
 from push_ros.pose_feed import Frame, PoseFeed
+from push_ros.process import run_node
 from push_ros.qos import LATCHED, STREAM
 from push_ros.validation import FRAME, InvalidMessage
 from push_scenario.scenario import Scenario, load_scenario
@@ -35,7 +37,7 @@ from push_supervisor.surroundings import Surroundings
 _POSE_PERIOD = 0.045  # [s] of the frames that are looked at
 
 
-class SupervisorNode(Node):  # type: ignore[misc]
+class SupervisorNode(Node):
     """One robot, one object, one job at a time."""
 
     def __init__(
@@ -384,3 +386,12 @@ class SupervisorNode(Node):  # type: ignore[misc]
             "pose jumps": self._poses.gate.jumps,
             "warning": "no poses" if self._pose(self.object) is None else "",
         }
+
+
+def main() -> int:
+    """Entry point of the process: ``--ros-args`` on its command line."""
+    return run_node(SupervisorNode)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

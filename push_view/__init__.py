@@ -1,1 +1,1 @@
-"""What a person sees: reports from bags, and a live view."""
+"""What a person sees: a live page, and reports from bags."""

@@ -1,6 +1,7 @@
 """The bridge node: the simulated world in place of real robots and motion capture."""
 
 import math
+import sys
 import time
 from typing import Any
 
@@ -27,6 +28,7 @@ from push_ros.conversions import (
 from push_ros.diagnostics import Diagnostics
 from push_ros.names import names_of
 from push_ros.parameters import declare_settings
+from push_ros.process import run_node
 from push_ros.qos import CLOCK, COMMAND, LATCHED, STATUS, STREAM
 from push_scenario.scenario import Scenario, load_scenario
 from sim_bridge.markers import body_markers
@@ -316,3 +318,12 @@ class BridgeNode(Node):
             self.world.close()
             self.world = None
         super().destroy_node()
+
+
+def main() -> int:
+    """Entry point of the process: ``--ros-args`` on its command line."""
+    return run_node(BridgeNode)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

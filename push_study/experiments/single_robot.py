@@ -1,7 +1,8 @@
-"""Experiments: seeded trials of a system, summary, plots, a bag, the thesis's figure beside."""
+"""Section 2.6, Table 2.1: one robot brings an object to a pose; noise and uncertain friction."""
 
-import csv
-import json
+import hashlib
+import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,16 +16,23 @@ import numpy as np
 
 from push_model import se2
 from push_model.arrays import Array
+from push_model.drives import HolonomicDrive
+from push_model.settings import SettingsError
 from push_planner import DistanceField, PlannerSettings, PushScene
-from push_record.recorder import RecorderNode, revision
-from push_ros.process import claim_domain
+from push_record.recorder import RecorderNode
+from push_ros.process import own_domain
 from push_scenario.scenario import Scenario, load_scenario
 from push_study.graph_run import LockstepRun
 from push_study.observer import Trace, final_errors
-from push_study.summary import aggregate
+from push_study.pool import Row
+from push_study.study import StudyOptions
 from push_study.thesis import TABLE_2_1
-from push_study.trials import Row, run_trials
-from push_view.report import draw_map, outlines_of, write_report
+from push_view.bodies import bodies_of
+from push_view.drawing import draw_map
+from push_view.report import write_report
+
+SCENARIOS = ("env1-target1",)
+"""Where none are named."""
 
 SUCCESS_POSITION = 0.02
 """[m] of the object at the end."""
@@ -34,7 +42,10 @@ SUCCESS_ORIENTATION = 0.1
 
 @dataclass(frozen=True)
 class SingleRobotTask:
-    """One trial. Noise in [m], [rad], [Hz], [s]; spread: relative, of every friction."""
+    """One trial. Noise in [m], [rad], [Hz], [s]; spread: relative, of every friction.
+
+    digest: of the scenario's text, so that a changed one is another task.
+    """
 
     scenario: str
     seed: int
@@ -45,6 +56,7 @@ class SingleRobotTask:
     latency: float = 0.01
     spread: float = 0.2
     record: bool = False
+    digest: str = ""
 
     @property
     def trace_file(self) -> Path:
@@ -80,6 +92,8 @@ def draw_world(task: SingleRobotTask) -> tuple[Scenario, Scenario, Row]:
     for name, (robot, start) in believed.robots.items():
         grip = float(random.uniform(1.0 - task.spread, 1.0 + task.spread))
         drive = robot.drive
+        if isinstance(drive, HolonomicDrive):
+            raise SettingsError(f"scenario '{task.scenario}': {name} has no wheels")
         drive = replace(drive, wheel_friction=drive.wheel_friction * grip)
         robots[name] = (replace(robot, drive=drive), start)
         drawn[f"{name}_wheel_friction"] = drive.wheel_friction
@@ -101,14 +115,41 @@ def min_clearance(scenario: Scenario, trace: Trace) -> float:
     return float(least)
 
 
-def single_robot_trial(task: SingleRobotTask) -> Row:
+def tasks(options: StudyOptions) -> list[SingleRobotTask]:
+    """One a scenario and seed; the first is recorded."""
+    digests = {}
+    for name in options.scenarios:
+        scenario = load_scenario(name)
+        if scenario.goal is None:
+            raise SettingsError(f"scenario '{name}' has no goal")
+        digests[name] = hashlib.sha256(scenario.text.encode()).hexdigest()[:16]
+    return [
+        SingleRobotTask(
+            name,
+            options.seed + i,
+            str(options.out),
+            record=(i == 0 and j == 0),
+            digest=digests[name],
+        )
+        for j, name in enumerate(options.scenarios)
+        for i in range(options.trials)
+    ]
+
+
+def trial(task: SingleRobotTask) -> Row:
     """Push the object to the scenario's goal once."""
-    claim_domain()
+    with own_domain():
+        return _push(task)
+
+
+def _push(task: SingleRobotTask) -> Row:
     believed, world, drawn = draw_world(task)
     if believed.goal is None:
         raise ValueError(f"scenario '{task.scenario}' has no goal")
     folder = Path(task.out)
     folder.mkdir(parents=True, exist_ok=True)  # on a machine of a cluster, perhaps
+    if task.record and (folder / "bag").exists():
+        shutil.rmtree(folder / "bag")  # of this trial, interrupted before its end
 
     def extra() -> list[Any]:
         return [RecorderNode(folder / "bag", believed, task.seed)] if task.record else []
@@ -152,40 +193,12 @@ def single_robot_trial(task: SingleRobotTask) -> Row:
     }
 
 
-def single_robot(
-    scenarios: list[str], trials: int, seed: int, out: Path, scheduler: str = "", workers: int = 0
-) -> dict[str, Any]:
-    """Section 2.6, Table 2.1, with noise and uncertain friction. Writes everything into ``out``."""
-    out.mkdir(parents=True, exist_ok=True)
-    tasks = [
-        SingleRobotTask(name, seed + i, str(out), record=(i == 0 and j == 0))
-        for j, name in enumerate(scenarios)
-        for i in range(trials)
-    ]
-    for name in ("bag", "trials.jsonl"):
-        if (out / name).exists():
-            raise FileExistsError(f"{out}/{name} is there already; choose another --out")
-    rows = run_trials(single_robot_trial, tasks, out / "trials.jsonl", scheduler, workers)
-    summary = {
-        "experiment": "single-robot",
-        "seed": seed,
-        "revision": revision(),
-        "requested": len(tasks),
-        "trials": rows,
-        "aggregate": aggregate(rows),
-    }
-    (out / "summary.json").write_text(json.dumps(summary, indent=1) + "\n")
-    if rows:
-        keys = list(dict.fromkeys(k for r in rows for k in r))
-        with (out / "trials.csv").open("w", newline="") as file:
-            writer = csv.DictWriter(file, keys)
-            writer.writeheader()
-            writer.writerows(rows)
-        for name in scenarios:
-            files = [t.trace_file for t in tasks if t.scenario == name]
-            _plot(name, [r for r in rows if r["scenario"] == name], files, out)
-    _print_table(rows, scenarios)
-    return summary
+def conclude(options: StudyOptions, tasks: Sequence[SingleRobotTask], rows: list[Row]) -> None:
+    """A picture of all trials of each scenario, and Table 2.1."""
+    for name in options.scenarios if rows else ():
+        files = [t.trace_file for t in tasks if t.scenario == name]
+        _plot(name, [r for r in rows if r["scenario"] == name], files, options.out)
+    _print_table(rows, list(options.scenarios))
 
 
 def _print_table(rows: list[Row], scenarios: list[str]) -> None:
@@ -213,9 +226,8 @@ def _print_table(rows: list[Row], scenarios: list[str]) -> None:
 def _plot(name: str, rows: list[Row], traces: list[Path], out: Path) -> None:
     scenario = load_scenario(name)
     figure, axes = plt.subplots(figsize=(9, 6))
-    draw_map(axes, scenario)
-    outlines = outlines_of(scenario)
-    item = next(iter(scenario.objects))
+    draw_map(axes, scenario.grid)
+    outline = bodies_of(scenario).type(next(iter(scenario.objects))).outline
     good_seeds = {r["seed"] for r in rows if r["success"]}
     for path in traces:
         if path.is_file():
@@ -224,11 +236,9 @@ def _plot(name: str, rows: list[Row], traces: list[Path], out: Path) -> None:
             axes.plot(
                 way[:, 0], way[:, 1], lw=0.8, alpha=0.7, color="#2a62c9" if good else "#c22f3d"
             )
-            axes.fill(*se2.transform(way[-1], outlines[item][0]).T, fill=False, lw=0.7)
+            axes.fill(*se2.transform(way[-1], outline).T, fill=False, lw=0.7)
     if scenario.goal is not None:
-        axes.fill(
-            *se2.transform(scenario.goal, outlines[item][0]).T, fill=False, lw=1.6, color="#c22f3d"
-        )
+        axes.fill(*se2.transform(scenario.goal, outline).T, fill=False, lw=1.6, color="#c22f3d")
     axes.set_title(f"{scenario.name}: {len(good_seeds)} of {len(rows)} trials succeed")
     figure.savefig(out / f"{scenario.name}.png", dpi=130, bbox_inches="tight")
     plt.close(figure)

@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from push_model import SettingsError, ellipse, flower, polygon, rectangle, shape_from_mapping
@@ -63,3 +63,46 @@ def test_polygons_are_centred_counterclockwise_or_refused(vertices):
 def test_bad_shapes_are_refused(bad):
     with pytest.raises(SettingsError):
         shape_from_mapping(bad)
+
+
+def segments_meet(a, b, c, d):
+    """Whether two closed segments with whole coordinates have a point in common."""
+
+    def turn(p, q, r):
+        value = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
+        return (value > 0) - (value < 0)
+
+    def between(p, q, r):
+        return all(min(p[i], q[i]) <= r[i] <= max(p[i], q[i]) for i in (0, 1))
+
+    signs = turn(a, b, c), turn(a, b, d), turn(c, d, a), turn(c, d, b)
+    if signs[0] != signs[1] and signs[2] != signs[3]:
+        return True
+    ends = zip(signs, ((a, b, c), (a, b, d), (c, d, a), (c, d, b)), strict=True)
+    return any(s == 0 and between(*p) for s, p in ends)
+
+
+@given(st.lists(st.tuples(st.integers(0, 4), st.integers(0, 4)), min_size=4, max_size=8))
+def test_crossing_sides_are_found_and_sides_on_one_line_are_let_be(vertices):
+    n = len(vertices)
+    sides = [(vertices[i], vertices[(i + 1) % n]) for i in range(n)]
+    crossing = any(
+        segments_meet(*sides[i], *sides[j])
+        for i in range(n)
+        for j in range(i + 2, n)
+        if (i, j) != (0, n - 1)
+    )
+    try:
+        polygon(np.array(vertices, dtype=float))
+        refused = False
+    except SettingsError as error:
+        refused = True
+        assume("cross" in str(error))  # others repeat a vertex or have no area
+    assert refused == crossing
+
+
+def test_sides_on_one_line_do_not_cross():
+    u = [[0, 0], [3, 0], [3, 2], [2, 2], [2, 1], [1, 1], [1, 2], [0, 2]]
+    assert polygon(np.array(u)).area == pytest.approx(5.0)
+    moved = polygon(np.array(u)).about((0.1, -0.2))
+    assert moved.sides[0].distance == pytest.approx(polygon(np.array(u)).sides[0].distance - 0.2)

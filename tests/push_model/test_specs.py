@@ -40,6 +40,14 @@ def test_every_drive_carries_every_bumper(drive, bumper):
         assert inside_convex(made.outline, np.array([[0.2499, 0.1499], [0.2499, -0.1499]])).all()
 
 
+def test_a_body_that_bulges_beyond_a_narrow_bumper_is_in_the_outline():
+    made = robot(bumper=FlatBumper(0.02, 0.21))
+    angle = np.linspace(0.0, 2.0 * math.pi, 500)
+    disc = 0.198 * math.cos(math.pi / 24) * np.column_stack([np.cos(angle), np.sin(angle)])
+    assert inside_convex(made.outline, disc).all()
+    assert inside_convex(made.outline, np.array([[0.2099, 0.0099], [0.2099, -0.0099]])).all()
+
+
 def test_what_is_left_out_is_written_out():
     """The bumper's height and the casters of a robot with wheels, and of one without."""
     wheeled, disc = robot(), robot(DISC)

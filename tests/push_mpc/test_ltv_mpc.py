@@ -6,13 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from push_model import CurvatureLimits, DifferentialDrive
-from push_mpc import (
-    DaqpBackend,
-    LtvMpc,
-    MpcSettings,
-    QpSolution,
-    Reference,
-)
+from push_mpc import LtvMpc, MpcSettings, Reference
+from push_qp import DaqpBackend, QpSolution
 
 DRIVE = DifferentialDrive(0.0205, 0.0265, 6.28)
 LIMITS = CurvatureLimits(-2.0, 2.0)
@@ -80,16 +75,89 @@ def test_obstacle_beside_the_line_is_avoided():
 def test_softened_rows_give_the_least_violation():
     """FAULTS 5: already inside an obstacle there is a solution, and it leads out."""
     circle = np.array([[0.05, 0.0, 0.08]])
-    mpc = LtvMpc(replace(MpcSettings(), max_slack=1.0), DRIVE)
+    mpc = LtvMpc(replace(MpcSettings(), max_obstacle_slack=1.0), DRIVE)
     result = mpc.solve(np.zeros(5), straight(v=0.0), None, circle)
     assert result.solved and result.slack > 0.01
     assert result.acceleration[0] < 0.0
 
 
-def test_violation_beyond_the_bound_is_a_failure():
-    mpc = LtvMpc(replace(MpcSettings(), max_slack=0.001), DRIVE)
-    result = mpc.solve(np.zeros(5), straight(v=0.0), None, np.array([[0.05, 0.0, 0.08]]))
-    assert not result.solved and "violated" in result.reason
+@pytest.mark.parametrize("seed", range(10))
+def test_a_robot_deep_inside_a_circle_is_not_solved_at_the_default_settings(seed):
+    """A 45 mm circle, up to 45 mm inside of it: solved where 5 mm can be held, nowhere else."""
+    random = np.random.default_rng(seed)
+    mpc, verdicts = LtvMpc(MpcSettings(), DRIVE), {True: 0, False: 0}
+    bound = MpcSettings().max_obstacle_slack
+    for _ in range(40):
+        depth = random.uniform(-0.025, 0.045)
+        angle = random.uniform(-np.pi, np.pi)
+        v = random.uniform(0.0, 0.07)
+        circle = np.array([[*(0.045 - depth) * np.array([np.cos(angle), np.sin(angle)]), 0.045]])
+        mpc.reset()
+        result = mpc.solve(np.array([0.0, 0.0, 0.0, v, 0.0]), straight(v=0.0), None, circle)
+        # as far as it may come out of it in the first step
+        if depth - 0.1 * v - 0.5 * MpcSettings().max_acceleration * 0.1**2 > bound:
+            assert not result.solved and "obstacle violated by" in result.reason
+        assert not result.solved or result.slack <= 1.0
+        verdicts[result.solved] += 1
+        if depth < bound:  # when it stands, it is solved
+            mpc.reset()
+            result = mpc.solve(np.zeros(5), straight(v=0.0), None, circle)
+            assert result.solved, result.reason
+    assert min(verdicts.values()) > 5
+    fault = mpc.solve(np.zeros(5), straight(v=0.0), None, np.array([[0.001, 0.0, 0.045]]))
+    assert not fault.solved and fault.acceleration == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "limits", "circles", "error"),
+    [
+        ("wheel speed", None, NONE, [0.0, 0.0, 0.0, 0.2, 0.0]),
+        ("stable curvature", CurvatureLimits(-1.0, 1.0), NONE, [0.0, 0.0, 0.0, 0.0, 1.5]),
+        ("obstacle", None, np.array([[0.05, 0.0, 0.08]]), [0.0] * 5),
+    ],
+)
+def test_each_kind_has_a_bound_of_its_own(kind, limits, circles, error):
+    """Loosening the other two changes nothing, loosening its own does."""
+    names = {
+        "wheel speed": "max_wheel_slack",
+        "stable curvature": "max_curvature_slack",
+        "obstacle": "max_obstacle_slack",
+    }
+    others = {name: 100.0 for k, name in names.items() if k != kind}
+    for settings, solved in (
+        (MpcSettings(), False),
+        (replace(MpcSettings(), **others), False),
+        (replace(MpcSettings(), **{names[kind]: 100.0}), True),
+    ):
+        mpc = LtvMpc(settings, DRIVE)
+        result = mpc.solve(np.array(error), straight(v=0.0), limits, circles)
+        assert result.solved == solved, result.reason
+        assert solved or result.reason.startswith(f"{kind} violated by")
+
+
+def test_noise_in_normal_operation_does_not_trip_the_bounds():
+    """A push beside a wall at the least distance, with 0.2 mm and 0.1 degrees of noise."""
+    for seed in range(10):
+        random = np.random.default_rng(seed)
+        mpc = LtvMpc(MpcSettings(), DRIVE)
+        x = np.linspace(-0.2, 1.0, 31)
+        side = random.choice([-1.0, 1.0])
+        wall = np.column_stack([x, np.full(31, side * 0.046), np.full(31, 0.045)])
+        state = np.array([0.0, 0.0, 0.0, 0.07, 0.0])
+        for k in range(300):
+            reference = straight()
+            reference = Reference(reference.pose + [0.0007 * k, 0, 0], reference.twist)
+            noise = random.normal(size=5) * [2e-4, 2e-4, 1.7e-3, 0.0, 0.0]
+            near = wall[np.argsort(np.abs(x - state[0]))[:20]]
+            e = state + noise - [0.0007 * k, 0, 0, 0.07, 0]
+            result = mpc.solve(e, reference, LIMITS, near)
+            assert result.solved, result.reason
+            state[3] = max(state[3] + 0.01 * result.acceleration[0], 0.0)
+            state[4] += 0.01 * result.acceleration[1]
+            state[0] += 0.01 * state[3] * np.cos(state[2])
+            state[1] += 0.01 * state[3] * np.sin(state[2])
+            state[2] += 0.01 * state[4]
+        assert state[0] > 0.19
 
 
 class Liar:

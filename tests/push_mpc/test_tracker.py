@@ -8,19 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from push_model import CurvatureLimits, DifferentialDrive, line, se2, unicycle_step
-from push_mpc import (
-    ActiveSetBackend,
-    DaqpBackend,
-    LtvMpc,
-    MpcSettings,
-    Push,
-    QpSolution,
-    Task,
-    TrackError,
-    TrackerSettings,
-    TrajectoryTracker,
-)
+from push_model import CurvatureLimits, DifferentialDrive, line, rotation, se2, unicycle_step
+from push_mpc import LtvMpc, MpcSettings, Push, Task, TrackError, TrackerSettings, TrajectoryTracker
+from push_qp import ActiveSetBackend, DaqpBackend, QpSolution
 
 DRIVE = DifferentialDrive(0.0205, 0.0265, 6.28)
 GRASP = np.array([0.095, 0.0, 0.0])
@@ -102,6 +92,31 @@ def test_frozen_poses_are_noticed():
     assert len(ticks) < 600
 
 
+@pytest.mark.parametrize("half_track", [0.0265, 0.165])
+def test_a_turn_against_a_wall_is_noticed_whatever_the_robot_s_width(half_track):
+    """A wide robot's wheels run far in a small turn: its lever is its own, not the e-puck's."""
+    drive = DifferentialDrive(0.08, half_track, 6.28)
+    settings = replace(TrackerSettings(), stuck_way=0.05, blocked_time=60.0, settle_time=60.0)
+    tracker = TrajectoryTracker(settings, LtvMpc(MpcSettings(), drive))
+    angle, rate = (0.4, 0.3) if half_track > 0.1 else (2.5, 2.0)
+    turn = rotation(np.zeros(3), angle, rate, 20.0 * rate)
+    tracker.start(Task(turn, None, NONE, 0.006, 0.03))
+    for _ in range(400):
+        tick = tracker.tick(0.01, np.zeros(3), None)
+        if tick.finished:
+            break
+    assert tick.code is TrackError.STUCK and "commanded" in tick.message
+
+
+@pytest.mark.parametrize(("allowed", "code"), [(0.045, "CONTACT_LOST"), (0.08, "NONE")])
+def test_how_far_an_object_may_slide_along_the_bumper_is_a_setting(allowed, code):
+    tracker = make(replace(TrackerSettings(), contact_aside=allowed))
+    tracker.start(task(0.8))
+    slid = GRASP + [0.0, 0.055, 0.0]
+    ticks = drive(tracker, np.zeros(3), 3, lambda t, r: se2.compose(r, slid))
+    assert [tick.code.name for tick, _ in ticks][-1] == code
+
+
 def test_pushed_off_course_is_noticed():
     tracker = make()
     tracker.start(task())
@@ -142,14 +157,16 @@ def under_way(solver=None, settings=None):
     return tracker, robot
 
 
-def test_failed_solves_stop_the_robot_and_are_reported():
+@pytest.mark.parametrize("patience", [10, 3])
+def test_failed_solves_stop_the_robot_and_are_reported(patience):
     """FAULTS 5: a problem without a solution stops it in the same tick; ten end the task."""
-    tracker, robot = under_way()
-    tracker.mpc._solver = Broken()
+    settings = replace(TrackerSettings(), solver_patience=patience)
+    tracker, robot = under_way(settings=settings)
+    tracker.controller._solver = Broken()
     ticks = [tick for tick, _ in drive(tracker, robot, 5)]
     assert all((t.v, t.omega) == (0.0, 0.0) for t in ticks)
     assert ticks[-1].code is TrackError.SOLVER_FAILED and ticks[-1].message == "broken"
-    assert len(ticks) == tracker.failures == 10
+    assert len(ticks) == tracker.failures == patience
 
 
 class Dreamer:
@@ -192,7 +209,7 @@ def test_delay_is_made_good_by_the_commands_since():
             tick = tracker.tick(0.01, past[-1 - delay], None)
             past.append(unicycle_step(past[-1], tick.v, tick.omega, 0.01))
             if k > 200 and not tick.finished:
-                now, _ = tracker._task.trajectory.sample(np.array([tracker._time]))
+                now, _ = tracker._task.trajectory.sample(np.array([tracker._clock.time]))
                 worst = max(worst, abs(past[-1][0] - now[0, 0]))
             if tick.finished:
                 break

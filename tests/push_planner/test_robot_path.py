@@ -138,7 +138,7 @@ import numpy as np
 from push_model.occupancy import rasterise
 from push_model.specs import BoxSpec, EnvironmentSpec
 from push_planner import PlannerSettings, PushPlanner, plan_robot_path
-from push_ros.scenario import load_scenario
+from push_scenario.scenario import load_scenario
 
 scenario = load_scenario("env1-target1")
 robot, item = scenario.robot()[1], scenario.object()[1]

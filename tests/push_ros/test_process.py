@@ -1,10 +1,16 @@
-"""Who hears a publisher."""
+"""Who hears a publisher; what a process holds, and gives back."""
+
+import io
+import os
+import sys
 
 import rclpy
 from geometry_msgs.msg import PoseStamped
+from std_msgs.msg import String
 
 from push_msgs.msg import JobState
-from push_ros.process import Spinner, heard
+from push_ros.latched import has_publisher, hear_latched
+from push_ros.process import Spinner, heard, own_domain
 from push_ros.qos import COMMAND, LATCHED
 
 
@@ -30,3 +36,43 @@ def test_another_subscriber_does_not_count(ros):
         assert spinner.until(lambda: goals, 5.0)
     finally:
         spinner.close()
+
+
+def test_a_closed_spinner_leaves_nobody_in_the_graph(ros):
+    """Its executor kept the node alive: a worker's next trial would have met the last one's."""
+    node = rclpy.create_node("guest")
+    node.create_publisher(JobState, "/job_state", LATCHED)
+    spinner = Spinner([node])
+    spinner.once(0.05)
+    assert has_publisher("/job_state", 10.0)
+    spinner.close()
+    assert not has_publisher("/job_state", 1.0)
+
+
+def test_an_executor_where_standard_error_is_no_file(ros, monkeypatch):
+    """As in a notebook."""
+    monkeypatch.setattr(sys, "stderr", io.StringIO())
+    spinner = Spinner([rclpy.create_node("guest")])
+    spinner.once(0.01)
+    spinner.close()
+
+
+def test_what_is_latched_is_heard_by_who_comes_late(ros):
+    node = rclpy.create_node("speaker")
+    publisher = node.create_publisher(String, "/text", LATCHED)
+    publisher.publish(String(data="spoken before"))
+    assert hear_latched(String, "/text", 10.0).data == "spoken before"
+    assert hear_latched(String, "/nothing", 0.2) is None
+    node.destroy_node()
+
+
+def test_a_domain_is_given_back(domain, monkeypatch):
+    with own_domain() as own:
+        assert own != domain and os.environ["ROS_DOMAIN_ID"] == str(own)
+        with own_domain() as other:
+            assert other not in (own, domain)
+    assert os.environ["ROS_DOMAIN_ID"] == str(domain)
+    monkeypatch.delenv("ROS_DOMAIN_ID")
+    with own_domain():
+        pass
+    assert "ROS_DOMAIN_ID" not in os.environ

@@ -65,6 +65,8 @@ def test_every_shipped_type_is_sound(kind, cls):
         ({"goal": [0, 0, math.inf]}, ["goal", "[x, y, theta]", "inf"]),
         ({"goal": [0, 0, 0], "goals": [[0, 0, 0]]}, ["one of 'goal', 'goals'"]),
         ({"events": [{"kind": "quake", "at": 1}]}, ["events[0].kind", "displace", "quake"]),
+        ({"robots": {True: {}}}, ["s.yaml.robots: a key must be text, got True"]),
+        ({"robots": {"r": {"type": {}, "start": [0, 0, 0]}}}, ["'bumper' (a mapping of kind flat"]),
         ({"robots": 3, "goal": "x"}, ["s.yaml.robots", "s.yaml.goal"]),
         ({"robots": {"r": {"type": 3, "start": [0, 0, 0], "mass": 1}}}, ["r.type", "3"]),
         ({"robots": {"r\u00f6": {"type": "epuck", "start": [0, 0, 0]}}}, ["letters"]),

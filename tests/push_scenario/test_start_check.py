@@ -117,7 +117,7 @@ def test_map_cells_are_walls_exactly(tmp_path):
 
 
 def test_random_objects_overlap_when_a_fine_raster_says_so():
-    """400 pairs of concave and convex outlines against points spread densely over both."""
+    """300 pairs of concave and convex outlines against points spread densely over both."""
     random = np.random.default_rng(11)
     shapes = [
         {"polygon": {"vertices": [[0, 0], [0.3, 0], [0.3, 0.1], [0.1, 0.1], [0.1, 0.3], [0, 0.3]]}},
@@ -126,14 +126,14 @@ def test_random_objects_overlap_when_a_fine_raster_says_so():
     ]
     specs = [ObjectSpec(s, 1.0, 0.1, 0.3, 0.2) for s in shapes]
     counts = {True: 0, False: 0}
-    for _ in range(400):
+    for _ in range(300):
         i, j = random.integers(0, 3, 2)
         a, b = (
             object_footprint("", specs[k], random.uniform([-0.2, -0.2, -3], [0.2, 0.2, 3]))
             for k in (i, j)
         )
         low, high = a.outline.min(axis=0), a.outline.max(axis=0)
-        grid = np.stack(np.meshgrid(*np.linspace(low, high, 120).T), axis=-1).reshape(-1, 2)
+        grid = np.stack(np.meshgrid(*np.linspace(low, high, 30).T), axis=-1).reshape(-1, 2)
         both = grid[inside(a.outline, grid) & inside(b.outline, grid)]
         met = a.meets(b)
         if len(both):
@@ -141,7 +141,7 @@ def test_random_objects_overlap_when_a_fine_raster_says_so():
             assert met or not deep
         else:  # no grid point in both: at most a sliver, with the two lines close
             lines = min(distance(a.outline, b.outline).min(), distance(b.outline, a.outline).min())
-            assert not met or lines < 5e-3
+            assert not met or lines < 0.02
         counts[met] += 1
     assert min(counts.values()) > 50
 
@@ -153,11 +153,11 @@ def test_clearance_is_never_more_than_the_way_to_a_wall(tmp_path):
         [1.0, 0.1, 0.0]
     )
     room = Room(scenario({"a": [0, 0, 0]}).environment)
-    points = random.uniform([-1.5, -1], [1.5, 1], (500, 2))
+    points = random.uniform([-1.5, -1], [1.5, 1], (300, 2))
     clear = room.clearance(points)
     probe = ObjectSpec({"rectangle": {"length": 2e-4, "width": 2e-4}}, 1.0, 0.1, 0.3, 0.2)
     for point, free in zip(points, clear, strict=True):
-        angle = random.uniform(-math.pi, math.pi, 8)
+        angle = random.uniform(-math.pi, math.pi, 5)
         for a in angle:
             at = point + 0.999 * max(free - 2e-4, 0.0) * np.array([math.cos(a), math.sin(a)])
             if free > 1e-3:

@@ -3,7 +3,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from push_model import SettingsError
@@ -192,6 +192,7 @@ aims = st.one_of(
 )
 
 
+@settings(max_examples=60)
 @given(
     st.data(),
     st.booleans(),

@@ -1,11 +1,19 @@
 """A whole experiment, small: a scenario given by path, in a map of its own."""
 
 import json
+import os
+from pathlib import Path
 
+import numpy as np
 import pytest
 
+from planar_push.main import main
+from push_model.settings import SettingsError
 from push_record.bag import read_metadata
-from push_study.experiments.single_robot import single_robot
+from push_study.cluster import isolated
+from push_study.experiments.single_robot import SingleRobotTask, trial
+from push_study.pool import local_results
+from push_study.study import StudyOptions, complete, experiment_names, run_study
 from push_view.report import PRODUCTS
 
 MEASURES = {
@@ -25,8 +33,10 @@ MEASURES = {
 
 def test_experiment_leaves_summary_traces_plot_bag_and_report(room, tmp_path, capsys):
     out = tmp_path / "out"
-    single_robot([room], 1, 5, out, workers=1)
-    summary = json.loads((out / "summary.json").read_text())
+    options = StudyOptions((room,), 1, 5, out, workers=1)
+    summary = run_study("single-robot", options)
+    assert complete(summary)
+    assert summary == json.loads((out / "summary.json").read_text())
     assert (summary["experiment"], summary["seed"], summary["requested"]) == ("single-robot", 5, 1)
     (row,) = summary["trials"]
     assert row.keys() >= MEASURES and row["seed"] == 5
@@ -34,11 +44,83 @@ def test_experiment_leaves_summary_traces_plot_bag_and_report(room, tmp_path, ca
     assert row["position_error_m"] < 0.02 and row["pushes"] == 1
     assert summary["aggregate"]["success"] == 1.0
     assert set(summary["aggregate"]["position_error_m"]) == {"mean", "std", "max"}
-    files = ["in_a_room.png", "trace-in_a_room-5.npz", "trials.csv", "trials.jsonl"]
+    files = ["in_a_room.png", "trace-in_a_room-5.npz", "trials.csv", "trials.jsonl", "study.json"]
     for name in [*files, *(f"report/{p}" for p in PRODUCTS)]:
-        assert (out / name).stat().st_size > 100, name
+        assert (out / name).stat().st_size > 50, name
     metadata = read_metadata(out / "bag")
     assert metadata["seed"] == "5" and "data:image/png;base64" in metadata["scenario"]
     assert "1/1" in capsys.readouterr().out
-    with pytest.raises(FileExistsError):
-        single_robot([room], 1, 5, out, workers=1)
+    written = (out / "bag" / "metadata.yaml").stat().st_mtime_ns
+    assert run_study("single-robot", options)["trials"] == summary["trials"]  # none is run again
+    assert (out / "bag" / "metadata.yaml").stat().st_mtime_ns == written
+    with pytest.raises(FileExistsError, match="seed"):
+        run_study("single-robot", StudyOptions((room,), 1, 6, out, workers=1))
+
+
+def test_rows_of_a_worker_that_stays_equal_those_of_fresh_processes(tmp_path):
+    """To the bit; the time that planning took is the only thing that may differ."""
+    tasks = [SingleRobotTask("short", seed, str(tmp_path / "pool")) for seed in (5, 6)]
+    pool = dict(local_results(trial, list(enumerate(tasks)), 1))
+    fresh = isolated(trial, SingleRobotTask("short", 6, str(tmp_path / "fresh")))
+    rows = [{k: v for k, v in r.items() if k != "plan_time_s"} for r in (pool[1], fresh)]
+    assert rows[0] == rows[1] and pool[0]["success"] and rows[0]["success"]
+    assert pool[0]["position_error_m"] != pool[1]["position_error_m"]
+    files = [np.load(tmp_path / where / "trace-short-6.npz") for where in ("pool", "fresh")]
+    for key in ("time", "robot", "object"):
+        assert files[0][key].tobytes() == files[1][key].tobytes(), key
+
+
+def test_a_trial_gives_its_domain_and_its_context_back(tmp_path, monkeypatch):
+    """What a worker must not keep from one trial to the next, also when a trial fails."""
+    import rclpy
+
+    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
+    held = len(list(Path(f"/proc/{os.getpid()}/fd").iterdir()))
+    for _ in range(3):
+        with pytest.raises(SettingsError):
+            trial(SingleRobotTask("atlantis", 1, str(tmp_path)))
+    assert "ROS_DOMAIN_ID" not in os.environ and not rclpy.ok()
+    assert len(list(Path(f"/proc/{os.getpid()}/fd").iterdir())) <= held
+
+
+@pytest.mark.parametrize(
+    ("words", "what"),
+    [
+        (["--trials", "0"], "at least 1"),
+        (["--workers", "-1"], "at least 0"),
+        (["--seed", "-4"], "at least 0"),
+        (["--trials", "many"], "whole number"),
+        (["--scenarios", "short,atlantis"], "atlantis"),
+        (["--scenarios", "short,short"], "each once"),
+        (["--scheduler", "tcp://nowhere:1"], "Dask"),
+    ],
+)
+def test_wrong_words_are_refused_before_anything_starts(tmp_path, capsys, words, what):
+    out = tmp_path / "out"
+    try:
+        code = main(["experiment", "single-robot", "--out", str(out), *words])
+    except SystemExit as refusal:  # by the grammar
+        code = refusal.code
+    assert code == 2 and what in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_an_unknown_experiment_is_answered_with_those_that_are(capsys):
+    assert "single-robot" in experiment_names()
+    assert main(["experiment", "alchemy"]) == 2
+    assert "single-robot" in capsys.readouterr().err
+
+
+def test_a_folder_that_holds_something_else_is_left_alone(tmp_path, capsys):
+    (tmp_path / "thesis.tex").write_text("years of work")
+    words = ["experiment", "single-robot", "--scenarios", "short", "--trials", "1"]
+    assert main([*words, "--out", str(tmp_path)]) == 2
+    assert "no study" in capsys.readouterr().err
+    assert [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_a_study_in_which_nothing_succeeds_is_not_complete():
+    rows = [{"success": False}, {"success": False}]
+    assert not complete({"trials": rows, "requested": 2})
+    assert not complete({"trials": [{"success": True}], "requested": 2})
+    assert complete({"trials": [{"success": True}, *rows], "requested": 3})

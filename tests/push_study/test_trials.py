@@ -1,5 +1,7 @@
-"""Trials in processes of their own: failures become rows, interruptions keep what is finished."""
+"""Trials in worker processes: failures become rows, interruptions keep what is finished, and a
+study goes on where it ended."""
 
+import io
 import json
 import os
 import signal
@@ -11,8 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from push_study.experiments.single_robot import aggregate
-from push_study.trials import run_trials
+from push_study.progress import Progress
+from push_study.summary import aggregate
+from push_study.trials import identity, read_journal, run_trials
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -22,6 +25,7 @@ class Task:
     seed: int
     what: str = "ok"
     scenario: str = "none"
+    out: str = ""
 
 
 def trial(task):
@@ -41,10 +45,57 @@ def test_rows_come_in_the_order_of_the_tasks_and_failures_are_rows(tmp_path):
     assert [r["success"] for r in rows] == [True, False, False, True]
     assert rows[1]["reason"] == "ValueError: no such thing"
     assert "died" in rows[2]["reason"] and "-9" in rows[2]["reason"]
-    assert rows[0]["pid"] != rows[3]["pid"] != os.getpid()
+    assert os.getpid() not in {rows[0]["pid"], rows[3]["pid"]}
     assert aggregate(rows)["success"] == 0.5
-    journal = [json.loads(line) for line in (tmp_path / "rows.jsonl").read_text().splitlines()]
-    assert sorted(r["seed"] for r in journal) == [1, 2, 3, 4]
+    lines = [json.loads(line) for line in (tmp_path / "rows.jsonl").read_text().splitlines()]
+    assert sorted(line["row"]["seed"] for line in lines) == [1, 2, 3, 4]
+
+
+def test_a_worker_stays_and_one_that_dies_costs_only_its_trial(tmp_path):
+    tasks = [Task(1), Task(2), Task(3, "die"), Task(4), Task(5, "raise"), Task(6)]
+    rows = run_trials(trial, tasks, tmp_path / "rows.jsonl", workers=1)
+    first, second = rows[0]["pid"], rows[3]["pid"]
+    assert rows[1]["pid"] == first != second == rows[5]["pid"]
+    assert [r["success"] for r in rows] == [True, True, False, True, False, True]
+    assert not Path(f"/proc/{first}").exists() and not Path(f"/proc/{second}").exists()
+
+
+def test_a_study_goes_on_and_repeats_nothing_that_is_finished(tmp_path, capsys):
+    journal = tmp_path / "rows.jsonl"
+    done = run_trials(trial, [Task(1), Task(2, "die"), Task(3)], journal, workers=1)
+    with journal.open("a") as file:
+        file.write('{"task": "cut o')
+    tasks = [Task(1, out="elsewhere"), Task(2), Task(3), Task(4)]
+    rows = run_trials(trial, tasks, journal, workers=1)
+    assert [r["seed"] for r in rows] == [1, 2, 3, 4] and all(r["success"] for r in rows)
+    assert (rows[0], rows[2]) == (done[0], done[2])  # with the pids of the first run
+    assert rows[1]["pid"] == rows[3]["pid"] != rows[0]["pid"]
+    assert "2 of 4 trials are kept" in capsys.readouterr().out
+    assert read_journal(journal) == {identity(t): r for t, r in zip(tasks, rows, strict=True)}
+    again = run_trials(trial, tasks, journal, workers=1)
+    assert again == rows
+
+
+def test_another_setting_is_another_task():
+    assert identity(Task(1)) == identity(Task(1, out="moved"))
+    assert len({identity(t) for t in (Task(1), Task(2), Task(1, "hang"), Task(1, "ok", "x"))}) == 4
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def test_a_bar_on_a_terminal_and_plain_lines_elsewhere():
+    row = {"scenario": "s", "seed": 3, "success": True, "reason": "there"}
+    for out in (Terminal(), io.StringIO()):
+        with Progress(4, 1, out) as progress:
+            progress.tell(row)
+            progress.tell({**row, "success": False})
+        text = out.getvalue()
+        assert "1 of 4 trials are kept" in text
+        assert "[  2/4] ok   s seed 3: there" in text and "[  3/4] FAIL" in text
+        assert ("3/4, 1 succeed" in text and "\r" in text) == out.isatty()
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

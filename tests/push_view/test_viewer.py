@@ -1,170 +1,222 @@
-"""The live view: what a page gets, and what it may ask for."""
+"""The live view: what pages are told, and what they may ask for."""
 
-import http.client
 import json
 import math
-import socket
-import threading
 
 import numpy as np
 import pytest
-import rclpy
-from geometry_msgs.msg import PoseStamped
-from nav_msgs.msg import OccupancyGrid
-from std_srvs.srv import Trigger
+from nav_msgs.msg import Path
+from std_msgs.msg import Bool, String
 
-from push_msgs.msg import JobState, Poses
-from push_ros.conversions import grid_to_ros, poses_to_ros
+from push_msgs.msg import ControllerStatus, JobState
+from push_ros.conversions import grid_to_ros, path_to_ros, pose_stamped_to_ros
 from push_ros.process import Spinner
-from push_ros.qos import COMMAND, LATCHED, STREAM
-from push_view.viewer import ViewerNode, ViewerServer
+from push_ros.qos import LATCHED, STATUS
+from push_view.suite_watch import SILENCE
+from tests.push_view.page_client import Page, Suite
 
-
-class Page:
-    """A browser's side, the viewer, and a node that stands on the other side of ROS."""
-
-    def __init__(self, scenario):
-        self.scenario = scenario
-        self.node = ViewerNode(scenario)
-        self.server = ViewerServer(self.node, "127.0.0.1", 0)
-        self.other = rclpy.create_node("other")
-        self.goals, self.cancels = [], []
-        self.other.create_subscription(PoseStamped, "/goal_pose", self.goals.append, COMMAND)
-        self.other.create_service(Trigger, "/cancel", self.on_cancel)
-        self.poses = self.other.create_publisher(Poses, "/poses", STREAM)
-        self.maps = self.other.create_publisher(OccupancyGrid, "/map", LATCHED)
-        self.states = self.other.create_publisher(JobState, "/job_state", LATCHED)
-        self.spinner = Spinner([self.node, self.other])
-        assert self.spinner.until(
-            lambda: (
-                self.poses.get_subscription_count() > 0
-                and self.other.count_publishers("/goal_pose") > 0
-                and self.node._cancel_client.service_is_ready()
-            ),
-            5.0,
-        )
-
-    def on_cancel(self, request, response):
-        self.cancels.append(request)
-        return response
-
-    def ask(self, method, path, body=None, headers=None):
-        """Status, type and body of an answer, while ROS goes on."""
-        result = []
-
-        def run():
-            connection = http.client.HTTPConnection("127.0.0.1", self.server.port, timeout=5)
-            if method == "POST":
-                headers_ = {"Content-Type": "application/json", **(headers or {})}
-                connection.request(method, path, body or "", headers_)
-            else:
-                connection.request(method, path)
-            answer = connection.getresponse()
-            data = answer.readline() if path == "/events" else answer.read()
-            result.append((answer.status, answer.getheader("Content-Type"), data))
-            connection.close()
-
-        thread = threading.Thread(target=run)
-        thread.start()
-        assert self.spinner.until(lambda: not thread.is_alive(), 6.0)
-        return result[0]
-
-    def view(self):
-        return json.loads(self.ask("GET", "/events")[2].removeprefix(b"data: "))
-
-    def close(self):
-        self.server.close()
-        self.spinner.close()
+GOAL = {"x": 1.0, "y": 0.5, "theta": 0.3}
 
 
 @pytest.fixture
 def page(ros, scenario):
-    page = Page(scenario)
+    page = Page(scenario, Suite())
+    assert page.ready()
     yield page
     page.close()
 
 
-def test_page_bodies_and_map(page):
+@pytest.fixture
+def teams(ros, scenario):
+    page = Page(scenario, Suite(("/left/", "/right/")))
+    assert page.ready()
+    yield page
+    page.close()
+
+
+def test_page_and_map(page, scenario):
     status, kind, body = page.ask("GET", "/")
     assert status == 200 and kind.startswith("text/html") and b"<canvas" in body
-    status, _, body = page.ask("GET", "/bodies")
-    assert set(json.loads(body)) == {"epuck1", "box"}
+    for name in ("page.js", "model.js", "scene.js", "side.js", "goal_drag.js"):
+        status, kind, body = page.ask("GET", f"/{name}")
+        assert status == 200 and kind.startswith("text/javascript") and len(body) > 100
     assert page.ask("GET", "/map.png")[0] == 404
-    page.maps.publish(grid_to_ros(page.scenario.grid, 1.0))
-    assert page.spinner.until(lambda: page.node.map_image() is not None, 5.0)
+    page.suite.maps.publish(grid_to_ros(scenario.grid, 1.0))
+    assert page.until(lambda: page.node.map_image() is not None)
     status, kind, body = page.ask("GET", "/map.png")
     assert (status, kind) == (200, "image/png") and body.startswith(b"\x89PNG")
-    assert page.view()["extent"] == pytest.approx(page.scenario.grid.extent)
-    assert page.ask("GET", "/elsewhere")[0] == 404
+    extent = page.events(lambda seen: "map" in seen)["map"]["extent"]
+    assert extent == pytest.approx(scenario.grid.extent)
+    for path in ("/elsewhere", "/../page_server.py", "/page/index.html"):
+        assert page.ask("GET", path)[0] == 404
+
+
+def test_bodies_are_learnt_from_the_topic_and_replaced_by_a_new_scenario(ros, scenario):
+    page = Page(None, Suite())
+    try:
+        page.suite.scenarios.publish(String(data=scenario.text))
+        page.suite.frame = {"box": np.array([0.5, -0.2, 1.0])}
+        seen = page.events(lambda s: s.get("poses", {}).get("x", [None, None])[1] is not None)
+        bodies = seen["bodies"]
+        assert bodies["names"] == ["epuck1", "box"]
+        outlines = [np.array(t["outline"]) for t in bodies["types"]]
+        assert [t["robot"] for t in bodies["types"]] == [True, False]
+        assert np.ptp(outlines[1], axis=0) == pytest.approx([0.09, 0.09])
+        assert seen["poses"]["x"] == [None, 5000] and seen["poses"]["a"] == [None, 1000]
+        page.suite.scenarios.publish(String(data="robots: {"))  # refused; the one before stays
+        page.suite.scenarios.publish(String(data=scenario.text.replace("epuck1", "other")))
+        page.suite.frame = {"epuck1": np.zeros(3), "other": np.array([0.1, 0.0, 0.0])}
+        seen = page.events(
+            lambda s: (
+                s.get("bodies", {}).get("names") == ["other", "box"]
+                and s.get("poses", {}).get("x", [None])[0] == 1000
+            )
+        )
+        assert seen["poses"]["revision"] == seen["bodies"]["revision"] == bodies["revision"] + 1
+    finally:
+        page.close()
 
 
 def test_events_carry_poses_and_states_and_nothing_that_is_not_json(page):
-    places = {"box": np.array([0.5, -0.2, 1.0]), "epuck1": np.array([0.4, math.nan, 1.0])}
-    frame = poses_to_ros(places, 3.5)
-    page.poses.publish(frame)
-    page.states.publish(JobState(state_name="PLANNING", reason="why <b>not</b>"))
-    assert page.spinner.until(lambda: b"PLANNING" in page.node.snapshot(), 5.0)
-    assert page.spinner.until(lambda: b'"box"' in page.node.snapshot(), 5.0)
-    view = page.view()
-    assert view["poses"]["box"] == pytest.approx([0.5, -0.2, 1.0])
-    assert "epuck1" not in view["poses"]
-    assert (view["state"], view["reason"]) == ("PLANNING", "why <b>not</b>")
+    page.suite.frame = {
+        "box": np.array([0.5, -0.2, 1.0]),
+        "epuck1": np.array([0.4, math.nan, 1.0]),
+        "stranger": np.array([0.4, 0.0, 1.0]),
+    }
+    state = JobState(system="single", robots=["epuck1"], object="box", progress=math.nan)
+    state.state_name, state.reason = "PLANNING", "why <b>not</b>\n\nevent: team"
+    page.suite.states["/"].publish(state)
+    seen = page.events(
+        lambda s: ("team", "/") in s and s.get("poses", {}).get("x", [0])[-1] is not None
+    )
+    poses = seen["poses"]
+    assert (poses["x"], poses["y"], poses["a"]) == ([None, 5000], [None, -2000], [None, 1000])
+    assert poses["lost"] == [0]
+    team = seen["team", "/"]
+    assert (team["state"], team["reason"]) == ("PLANNING", state.reason)
+    assert seen["members", "/"]["robots"] == ["epuck1"]
+    assert seen["log", "/"]["entries"] == [[0.0, "PLANNING", state.reason]]
+
+
+def test_the_panel_of_a_single_robot_and_the_plan(page):
+    page.suite.states["/"].publish(JobState(system="single", robots=["epuck1"], object="box"))
+    statuses = page.suite.node.create_publisher(
+        ControllerStatus, "/epuck1/controller/status", STATUS
+    )
+    paths = page.suite.node.create_publisher(Path, "/push_path", LATCHED)
+    assert page.until(lambda: statuses.get_subscription_count() > 0)
+    statuses.publish(
+        ControllerStatus(error_x=0.003, error_y=-0.004, v=0.07, obstacle_margin=math.inf)
+    )
+    message = path_to_ros([], 0.0)
+    message.poses = [pose_stamped_to_ros(np.array([0.1, i / 1e3, 0.0]), 0.0) for i in range(999)]
+    paths.publish(message)
+    seen = page.events(lambda s: ("path", "/") in s and s.get(("panel", "/"), {}).get("rows"))
+    rows = dict(seen["panel", "/"]["rows"])
+    assert rows["tracking error"] == "5.0 mm" and rows["speed"] == "70 mm/s"
+    assert rows["obstacle margin"] == "–"
+    path = seen["path", "/"]
+    assert len(path["x"]) == len(path["y"]) == 400 and path["y"][-1] == 0.998
 
 
 def test_a_goal_and_a_cancel_of_the_page_reach_ros(page):
-    status, _, _ = page.ask("POST", "/goal", json.dumps({"x": 1.0, "y": 0.5, "theta": 0.3}))
+    status, data = page.send(**GOAL)
     assert status == 202
-    assert page.spinner.until(lambda: page.goals, 5.0)
-    goal = page.goals[0]
+    assert page.until(lambda: page.suite.goals["/"])
+    goal = page.suite.goals["/"][0]
     assert goal.header.frame_id == "map"
     assert (goal.pose.position.x, goal.pose.position.y) == (1.0, 0.5)
-    assert page.ask("POST", "/cancel")[0] == 202
-    assert page.spinner.until(lambda: page.cancels, 5.0)
+    assert json.loads(data)["stamp"] == f"{goal.header.stamp.sec}.{goal.header.stamp.nanosec:09d}"
+    assert page.ask("POST", "/cancel", "{}")[0] == 202
+    assert page.until(lambda: page.suite.cancels["/"] == 1)
+
+
+def test_each_team_has_its_state_and_gets_its_own_goals(teams):
+    for space, robot in (("/left/", "epuck1"), ("/right/", "other")):
+        state = JobState(system="single", robots=[robot], object="box", state_name=robot.upper())
+        teams.suite.states[space].publish(state)
+    seen = teams.events(lambda s: ("team", "/left/") in s and ("team", "/right/") in s)
+    assert seen["teams"]["spaces"] == ["/left/", "/right/"]
+    assert seen["team", "/right/"]["state"] == "OTHER"
+    assert teams.send(space="/right/", **GOAL)[0] == 202
+    assert teams.until(lambda: teams.suite.goals["/right/"])
+    assert teams.suite.goals["/left/"] == []
+    assert teams.ask("POST", "/cancel", '{"space": "/left/"}')[0] == 202
+    assert teams.until(lambda: teams.suite.cancels["/left/"])
+    assert teams.suite.cancels["/right/"] == 0
+    status, data = teams.send(space="/middle/", **GOAL)
+    assert status == 409 and b"/middle/" in data
+
+
+def test_a_goal_is_known_again_by_its_stamp(page):
+    """Of two equal goals each is told what became of it: one is taken, one refused."""
+    stamps = [json.loads(page.send(**GOAL)[1])["stamp"] for _ in range(2)]
+    assert len(set(stamps)) == 2
+    assert page.until(lambda: len(page.suite.goals["/"]) == 2)
+    taken, refused = page.suite.goals["/"]
+    state = JobState(goal=taken, refused_goal=refused, refusals=1, refusal="it is in a wall")
+    page.suite.states["/"].publish(state)
+    team = page.events(lambda s: s.get(("team", "/"), {}).get("refusals"))["team", "/"]
+    assert [team["stamp"], team["refused_stamp"]] == stamps
+    assert team["refusal"] == "it is in a wall"
 
 
 @pytest.mark.parametrize(
     "body",
-    ["", "{", '{"x": 1}', '{"x": "a", "y": 0, "theta": 0}', '{"x": NaN, "y": 0, "theta": 0}'],
+    ["", "{", "[]", "3", '{"x": 1}', '{"x": "a", "y": 0, "theta": 0}']
+    + ['{"x": NaN, "y": 0, "theta": 0}', '{"x": 1, "y": 0, "theta": 0, "space": 3}']
+    + ['{"x": 1e400, "y": 0, "theta": 0}', "[" * 9000],
 )
 def test_a_goal_that_is_none_is_refused(page, body):
     status, _, text = page.ask("POST", "/goal", body)
     assert status == 400 and b"expected x, y, theta" in text
-    assert page.goals == []
+    assert page.suite.goals["/"] == []
 
 
-GOAL = json.dumps({"x": 1.0, "y": 0.5, "theta": 0.3})
+def test_no_goal_is_taken_where_there_is_no_suite(ros, scenario):
+    page = Page(scenario)
+    try:
+        assert page.until(lambda: "nobody publishes /poses" in page.node.suite()["trouble"])
+        status, data = page.send(**GOAL)
+        assert status == 409 and b"nobody publishes /poses" in data
+        assert page.ask("POST", "/cancel", "{}")[0] == 409
+    finally:
+        page.close()
 
 
-@pytest.mark.parametrize(
-    "headers",
-    [
-        {"Origin": "http://evil.example"},
-        {"Origin": "http://evil.example:8080", "Host": "evil.example:8080"},
-        {"Content-Type": "text/plain"},
-        {"Content-Length": "many"},
-    ],
-)
-def test_other_sites_cannot_move_the_robot(page, headers):
-    """Also where a name of theirs leads here, or where their form is sent without asking."""
-    assert page.ask("POST", "/goal", GOAL, headers)[0] == 403
-    own = {"Origin": f"http://127.0.0.1:{page.server.port}"}
-    assert page.ask("POST", "/goal", GOAL, own)[0] == 202
-    assert page.spinner.until(lambda: page.goals, 5.0) and len(page.goals) == 1
+def test_a_suite_that_falls_silent_takes_no_goal(page):
+    """Nothing of it leaves the graph, as when its machine is gone: the silence tells."""
+    page.suite.silent()
+    assert SILENCE < 0.8
+    assert page.until(lambda: "silent" in page.node.suite()["trouble"])
+    seen = page.events(lambda s: "silent" in s.get("suite", {}).get("trouble", ""))
+    assert "silent" in seen["suite"]["teams"]["/"]
+    status, data = page.send(**GOAL)
+    assert status == 409 and b"silent" in data
+    page.until(lambda: bool(page.suite.goals["/"]), 0.3)
+    assert page.suite.goals["/"] == []
 
 
-def test_the_body_of_a_refused_request_is_not_taken_for_another(page):
-    length = f"Content-Length: {len(GOAL)}"
-    own = f"Host: 127.0.0.1:{page.server.port}\r\nContent-Type: application/json"
-    inner = f"POST /goal HTTP/1.1\r\n{own}\r\n{length}\r\n\r\n{GOAL}"
-    outer = (
-        f"POST /goal HTTP/1.1\r\nOrigin: http://evil.example\r\n{own}\r\n"
-        f"Content-Length: {len(inner)}\r\n\r\n{inner}"
-    )
-    with socket.create_connection(("127.0.0.1", page.server.port), timeout=5) as connection:
-        connection.sendall(outer.encode())
-        answers = b""
-        while chunk := connection.recv(4096):
-            answers += chunk
-    assert answers.count(b"HTTP/1.1") == 1 and b"403" in answers
-    page.spinner.until(lambda: bool(page.goals), 0.3)
-    assert page.goals == []
+def test_a_pause_is_no_silence(page):
+    page.suite.paused.publish(Bool(data=True))
+    page.suite.silent()
+    assert page.until(lambda: page.node.suite()["paused"])
+    assert not page.until(lambda: page.node.suite()["trouble"] != "", 2.0 * SILENCE)
+    assert page.send(**GOAL)[0] == 202
+
+
+def test_a_team_that_leaves_the_graph_takes_no_goal(teams):
+    """The poses go on: the graph tells. The other team is not touched."""
+    teams.suite.node.destroy_publisher(teams.suite.states["/left/"])
+    assert teams.until(lambda: teams.node.suite()["teams"]["/left/"] != "")
+    status, data = teams.send(space="/left/", **GOAL)
+    assert status == 409 and b"nobody takes goals on /left/goal_pose" in data
+    assert teams.send(space="/right/", **GOAL)[0] == 202
+
+
+def test_a_viewer_that_hangs_takes_no_goal(page):
+    """Its threads still answer, but nothing of what they know is new."""
+    page.spinner.close()
+    page.spinner = Spinner([])
+    assert page.until(lambda: "hangs" in page.node.suite()["trouble"], 3.0)
+    assert page.send(**GOAL)[0] == 409

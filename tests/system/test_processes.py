@@ -1,6 +1,5 @@
 """One process per node: dead nodes, restarts, signals at any moment, the demo."""
 
-import os
 import signal
 import subprocess
 import sys
@@ -8,19 +7,25 @@ import time
 
 import numpy as np
 import pytest
-import yaml
-from mcap.reader import make_reader
 
-from push_bringup.launcher import Child, Launcher, single_robot
+from push_bringup.launcher import Child, Launcher
 from push_bringup.monitor import Monitor
+from push_bringup.systems import MODULES, recorder
+from push_model.jobs import JobError
 from push_msgs.msg import JobState
-from push_record.bag import bag_file, read_bag
+from push_record.bag import read_bag
+from tests.system.processes import (
+    alive,
+    assert_closed,
+    children_of,
+    command,
+    launcher_of,
+    running,
+    until,
+)
 
-FACTOR = ["--ros", "-p", "real_time_factor:=3.0"]
-
-
-def alive(group):
-    return [c for c in group if c.process is not None and c.process.poll() is None]
+pytestmark = pytest.mark.live
+GOAL = (0.1, 0.04, 0.1)
 
 
 def standstill(bag, sign, limit):
@@ -48,15 +53,14 @@ def standstill(bag, sign, limit):
 def test_killed_node(domain, victim, respawn, tmp_path):
     """FAULTS 11: wheels stop, the launcher names the dead; with respawn the goal is reached."""
     said = []
-    launcher = Launcher(
-        single_robot("short", str(tmp_path / "bag"), {"bridge": FACTOR}), respawn, said.append
-    )
+    bag = tmp_path / "bag"
+    launcher = launcher_of(tmp_path / "s", said=said, respawn=respawn, record=bag, factor=3.0)
     launcher.start()
     try:
         with Monitor() as monitor:
             assert monitor.connect(40.0, lambda: not launcher.check())
-            monitor.send_goal((0.1, 0.04, 0.1))
-            assert monitor.wait(40.0, lambda: monitor.position[0] > -0.35)
+            monitor.send_goal(GOAL)
+            assert monitor.wait(40.0, lambda: monitor.pose[0] > -0.35)
             (child,) = [c for c in launcher.children if c.name == victim]
             child.process.send_signal(signal.SIGKILL)
             killed = monitor.stamp
@@ -65,9 +69,9 @@ def test_killed_node(domain, victim, respawn, tmp_path):
             if not respawn:
                 assert monitor.wait(20.0, lambda: monitor.stamp > killed + 2.0)
             else:
-                code = monitor.follow(90.0, lambda: launcher.check() is not None)
-                assert code == 0, monitor.state.reason
-                assert np.hypot(monitor.position[0] - 0.1, monitor.position[1] - 0.04) < 0.02
+                result = monitor.follow(90.0, lambda: launcher.check() is not None)
+                assert result.success, result
+                assert result.position_error < 0.02
     finally:
         children = list(launcher.children)
         started = time.monotonic()
@@ -79,27 +83,28 @@ def test_killed_node(domain, victim, respawn, tmp_path):
             "controller": ("/epuck1/cmd_vel", 0.4),
             "supervisor": ("/epuck1/heartbeat", 1.0),
         }[victim]
-        covered, way = standstill(tmp_path / "bag", sign, limit)
+        covered, way = standstill(bag, sign, limit)
         assert covered > 1.5 and way < 1e-3  # it rocks by 0.2 mm
-    topics = {r.topic for r in read_bag(tmp_path / "bag")}
+    topics = {r.topic for r in read_bag(bag)}
     assert {"/poses", "/epuck1/cmd_vel", "/job_state"} <= topics
 
 
-def test_a_planner_killed_at_work_is_asked_again(domain):
+def test_a_planner_killed_at_work_is_asked_again(domain, tmp_path):
     """FAULTS 11: it dies with the request; the one started in its place gets it anew."""
     said = []
-    launcher = Launcher(single_robot("short", "", {"bridge": FACTOR}), True, said.append)
+    launcher = launcher_of(tmp_path / "s", said=said, respawn=True, factor=3.0)
     launcher.start()
     try:
         with Monitor() as monitor:
             assert monitor.connect(40.0, lambda: not launcher.check())
             (child,) = [c for c in launcher.children if c.name == "planner"]
             child.process.send_signal(signal.SIGSTOP)  # it takes the request but never answers
-            monitor.send_goal((0.1, 0.04, 0.1))
+            monitor.send_goal(GOAL)
             assert monitor.wait(10.0, lambda: monitor.state.state == JobState.PLANNING)
             monitor.wait(0.5, lambda: False)
             child.process.send_signal(signal.SIGKILL)
-            assert monitor.follow(90.0, lambda: launcher.check() is not None) == 0, monitor.state
+            result = monitor.follow(90.0, lambda: launcher.check() is not None)
+            assert result.success, result
     finally:
         launcher.stop()
     assert any("planner died (signal 9)" in text for text in said)
@@ -109,53 +114,29 @@ def test_a_planner_killed_at_work_is_asked_again(domain):
 @pytest.mark.parametrize("seed", range(2))
 def test_signals_at_random_moments(domain, number, seed, tmp_path):
     """FAULTS 18: everything ends within five seconds, none left, the bag is readable."""
-    moment = np.random.default_rng([seed, int(number)]).uniform(0.05, 5.0)
-    process = subprocess.Popen(
-        [
-            sys.executable,
-            "-m",
-            "planar_push.cli",
-            "launch",
-            "single",
-            "--scenario",
-            "short",
-            "--record",
-            str(tmp_path / "bag"),
-        ],
+    moment = np.random.default_rng([seed, int(number)]).uniform(0.05, 8.0)
+    process = command(
+        *("launch", "single", "--scenario", "short", "--record", str(tmp_path / "bag")),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
-        start_new_session=True,
     )
     time.sleep(moment)
     children = children_of(process.pid)
     process.send_signal(number)
     process.wait(5.0)
     time.sleep(0.1)
-    assert not [pid for pid in children if os.path.exists(f"/proc/{pid}") and not zombie(pid)]
+    assert not running(children)
     if (tmp_path / "bag").exists():
         assert_closed(tmp_path / "bag")
-
-
-def assert_closed(bag):
-    """By a strict reader: footer, summary and metadata are there and agree."""
-    with bag_file(bag).open("rb") as file:
-        summary = make_reader(file).get_summary()
-        assert summary is not None and summary.statistics is not None
-        count = summary.statistics.message_count
-    information = yaml.safe_load((bag / "metadata.yaml").read_text())
-    assert information["rosbag2_bagfile_information"]["message_count"] == count
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_signals_end_a_demo(domain, number, tmp_path):
     """FAULTS 18, in the middle of a push."""
-    words = ["demo", "--scenario", "short", "--out", str(tmp_path / "demo")]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "planar_push.cli", *words],
+    process = command(
+        *("demo", "--scenario", "short", "--out", str(tmp_path / "demo")),
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
-        text=True,
-        start_new_session=True,
     )
     for line in process.stdout:
         if "pushing" in line:
@@ -165,20 +146,19 @@ def test_signals_end_a_demo(domain, number, tmp_path):
     process.send_signal(number)
     process.communicate(timeout=5.0)
     assert process.returncode == 130
-    assert not [pid for pid in children if os.path.exists(f"/proc/{pid}") and not zombie(pid)]
+    assert not running(children)
     assert_closed(tmp_path / "demo" / "bag")
 
 
 def test_a_recorder_that_is_started_again_writes_beside_the_first_bag(domain, tmp_path):
     said = []
-    children = [
-        Child("recorder", ["recorder", "--scenario", "short", "--out", str(tmp_path / "b")])
-    ]
-    launcher = Launcher(children, True, said.append)
+    bag = tmp_path / "b"
+    words = recorder(str(bag)).words("short")
+    launcher = Launcher([Child("recorder", MODULES["recorder"], words, bag)], True, said.append)
     launcher.start()
     try:
-        assert until(lambda: list((tmp_path / "b").glob("*.mcap")), 30.0)
-        children[0].process.send_signal(signal.SIGKILL)
+        assert until(lambda: list(bag.glob("*.mcap")), 30.0)
+        launcher.children[0].process.send_signal(signal.SIGKILL)
         assert until(launcher.check, 5.0) or said
         assert until(lambda: list((tmp_path / "b-2").glob("*.mcap")), 30.0)
         assert not launcher.check(), said
@@ -187,28 +167,24 @@ def test_a_recorder_that_is_started_again_writes_beside_the_first_bag(domain, tm
     assert_closed(tmp_path / "b-2")
 
 
-def test_a_node_that_dies_again_and_again_is_given_up(domain):
+def test_a_node_that_dies_again_and_again_is_given_up(domain, tmp_path):
     said = []
-    launcher = Launcher([Child("bad", ["bridge", "--scenario", "atlantis"])], True, said.append)
+    words = ["--ros-args", "-p", "scenario:=atlantis"]
+    bad = Child("bad", MODULES["bridge"], words)
+    launcher = Launcher([bad], True, said.append, logs=tmp_path)
     launcher.start()
     assert launcher.run() == 1
     assert sum("is started again" in text for text in said) == 5
     assert "not started again" in " ".join(said) and said[-1] == "stopping the rest"
-
-
-def until(condition, limit):
-    end = time.monotonic() + limit
-    while time.monotonic() < end and not condition():
-        time.sleep(0.05)
-    return condition()
+    assert "atlantis" in launcher.last_words("bad")
 
 
 @pytest.mark.parametrize("value", ["0.0", "fast"])
 def test_a_wrong_parameter_on_the_command_line_is_an_error_not_a_traceback(domain, value):
     """FAULTS 20."""
-    words = ["node", "bridge", "--scenario", "short", "--ros", "-p", f"real_time_factor:={value}"]
+    words = ["bridge", "--scenario", "short", "--ros", "-p", f"real_time_factor:={value}"]
     done = subprocess.run(
-        [sys.executable, "-m", "planar_push.cli", *words],
+        [sys.executable, "-m", "planar_push", "node", *words],
         capture_output=True,
         text=True,
         timeout=60,
@@ -218,63 +194,26 @@ def test_a_wrong_parameter_on_the_command_line_is_an_error_not_a_traceback(domai
     assert "real_time_factor" in done.stderr
 
 
-def children_of(pid):
-    found = []
-    for entry in os.listdir("/proc"):
-        if entry.isdigit():
-            try:
-                with open(f"/proc/{entry}/stat") as file:
-                    if int(file.read().rsplit(")", 1)[1].split()[1]) == pid:
-                        found.append(int(entry))
-            except OSError:
-                continue
-    return found
-
-
-def zombie(pid):
-    try:
-        with open(f"/proc/{pid}/stat") as file:
-            return file.read().rsplit(")", 1)[1].split()[0] == "Z"
-    except OSError:
-        return True
-
-
 def test_demo_ends_with_bag_pictures_and_report(domain, tmp_path):
-    done = subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            "planar_push.cli",
-            "demo",
-            "--scenario",
-            "short",
-            "--factor",
-            "3",
-            "--out",
-            str(tmp_path / "demo"),
-        ],
-        capture_output=True,
-        text=True,
-        timeout=180,
-        check=False,
+    process = command(
+        *("demo", "--scenario", "short", "--factor", "3", "--out", str(tmp_path / "demo")),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
     )
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "final error" in done.stdout and "pushing" in done.stdout
+    out, err = process.communicate(timeout=240)
+    assert process.returncode == 0, out + err
+    assert "final error" in out and "pushing" in out
     for name in ("trajectory.png", "animation.gif", "report.pdf", "bag/metadata.yaml"):
         assert (tmp_path / "demo" / name).stat().st_size > 1000, name
 
 
-def test_goal_ends_with_the_suite(domain):
+def test_goal_ends_with_the_suite(domain, tmp_path):
     """Nobody waits for an answer that cannot come."""
-    launcher = Launcher(single_robot("short"), False, lambda text: None)
+    launcher = launcher_of(tmp_path / "s")
     launcher.start()
     try:
-        words = ["goal", "0.1", "0.04", "0.1"]
-        process = subprocess.Popen(
-            [sys.executable, "-m", "planar_push.cli", *words],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
+        process = command(
+            *("goal", "0.1", "0.04", "0.1"), stdout=subprocess.PIPE, stderr=subprocess.PIPE
         )
         for line in process.stdout:
             if "planning" in line:
@@ -286,12 +225,30 @@ def test_goal_ends_with_the_suite(domain):
     assert process.returncode == 1 and "ended before the job" in error
 
 
-def test_wrong_words_are_answered_with_what_to_do():
-    done = subprocess.run(
-        [sys.executable, "-m", "planar_push.cli", "launch", "single", "--scenario", "atlantis"],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    assert done.returncode != 0 and "atlantis" in done.stderr and "env1-target1" in done.stderr
+def test_goal_follows_its_own_goal(domain, tmp_path):
+    """A stranger's goals, refused or taken, are not mistaken for its own."""
+    launcher = launcher_of(tmp_path / "s", factor=3.0)
+    launcher.start()
+    try:
+        with Monitor() as mine, Monitor() as stranger:
+            assert mine.connect(40.0) and stranger.connect(40.0)
+            mine.send_goal(GOAL)
+            assert mine.wait(20.0, lambda: mine.state.state > JobState.PLANNING)
+            stranger.send_goal((50.0, 0.0, 0.0))  # outside the map
+            refused = stranger.follow(20.0)
+            assert refused.refused and refused.code is JobError.OUTSIDE_MAP, refused
+            mine.spin()
+            assert mine.poll() is None
+            # the same goal, sent by somebody else, changes nothing
+            stranger.send_goal(GOAL)
+            result = mine.follow(90.0)
+            assert result.success and result.position_error < 0.02, result
+            # another one takes over, and that is told
+            mine.send_goal((-0.3, 0.3, 0.0))
+            assert mine.wait(20.0, lambda: mine.state.state == JobState.PLANNING)
+            assert mine.poll() is None
+            stranger.send_goal((0.4, 0.1, 0.0))
+            replaced = mine.follow(30.0)
+            assert replaced.code is JobError.PREEMPTED and not replaced.refused, replaced
+    finally:
+        launcher.stop()

@@ -2,9 +2,10 @@
 
 Compiled, and shaped for a condensed MPC: a row is a combination of the outputs of one step, so all
 rows are checked through the outputs, and only those that enter the working set are ever written
-out. Starts from the working set of the previous tick; beyond it, the constraint to add is the one
-that is violated most as measured in the metric of H on the subspace that is still free (the dual
-steepest edge), which takes about as many iterations as there are active rows in the end.
+out. Equalities come first and are never dropped. Starts from the working set of the previous tick;
+beyond it, the constraint to add is the one that is violated most as measured in the metric of H on
+the subspace that is still free (the dual steepest edge), which takes about as many iterations as
+there are active rows in the end.
 
     D. Goldfarb and A. Idnani, A numerically stable dual method for solving strictly convex
     quadratic programs, Mathematical Programming 27, 1-33, 1983.
@@ -16,131 +17,25 @@ from typing import Any
 import numba
 import numpy as np
 
+from push_qp.factors import add_column, dot, drop_column, inverse_factor
+from push_qp.rows import outputs, rooms, write_row
+
 OPTIMAL = 0
 INFEASIBLE = 1
 TOO_MANY_ITERATIONS = 2
 NOT_CONVEX = 3
 NOT_FINITE = 4
-WORDS = ("optimal", "infeasible", "too many iterations", "not convex", "not finite")
-
-
-@numba.njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
-def outputs(S: Any, g: Any, width: Any, z: Any, y: Any) -> None:
-    """y_k = g_k + S_k u; only the first ``width[k]`` inputs move output k."""
-    for k in range(g.shape[0]):
-        w = width[k]
-        for i in range(g.shape[1]):
-            total = 0.0
-            for c in range(w):
-                total += S[k, i, c] * z[c]
-            y[k, i] = g[k, i] + total
-
-
-@numba.njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
-def rooms(normal: Any, bound: Any, y: Any, slack: Any, room: Any) -> None:
-    """room_kj = bound_kj + slack_j - normal_kj . y_k; ``slack`` is ``(rows of a step,)``."""
-    for k in range(y.shape[0]):
-        for j in range(bound.shape[1]):
-            room[k, j] = bound[k, j] + slack[j]
-        for i in range(y.shape[1]):
-            value = y[k, i]
-            for j in range(bound.shape[1]):
-                room[k, j] -= normal[k, i, j] * value
-
-
-@numba.njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
-def write_row(
-    S: Any, g: Any, width: Any, normal: Any, bound: Any, family: Any, k: int, j: int, row: Any
-) -> float:
-    """Row (k, j) as row . z <= the value returned."""
-    inputs = S.shape[2]
-    right = bound[k, j]
-    row[:] = 0.0
-    for i in range(g.shape[1]):
-        a = normal[k, i, j]
-        if a != 0.0:
-            right -= a * g[k, i]
-            for c in range(width[k]):
-                row[c] += a * S[k, i, c]
-    if family[j] >= 0:
-        row[inputs + family[j]] = -1.0
-    return float(right)
-
-
-@numba.njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
-def _inverse_factor(H: Any, L: Any, JT: Any) -> bool:
-    """JT = L^-1 with H = L L'; False when H is not positive definite (or not finite)."""
-    n = H.shape[0]
-    for i in range(n):
-        for j in range(i):
-            total = H[i, j]
-            for c in range(j):
-                total -= L[i, c] * L[j, c]
-            L[i, j] = total * L[j, j]  # the diagonal holds reciprocals
-        total = H[i, i]
-        for c in range(i):
-            total -= L[i, c] * L[i, c]
-        if not (total > 1e-14 * H[i, i] and total < math.inf):
-            return False
-        L[i, i] = 1.0 / math.sqrt(total)
-    JT[:] = 0.0
-    for i in range(n):
-        for j in range(i):
-            factor = L[i, j]
-            if factor != 0.0:
-                for c in range(j + 1):
-                    JT[i, c] -= factor * JT[j, c]
-        for c in range(i):
-            JT[i, c] *= L[i, i]
-        JT[i, i] = L[i, i]
-    return True
-
-
-@numba.njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
-def _add(JT: Any, R: Any, d: Any, q: int, norm: float, w: Any) -> None:
-    """Turn the rows q.. of JT so that d becomes (d_1, norm, 0 ..); d_1, norm: column q of R."""
-    n = JT.shape[0]
-    for i in range(q):
-        R[i, q] = d[i]
-    # Householder: v = d_2 - s |d_2| e_1, with the sign that does not cancel
-    s = -norm if d[q] > 0.0 else norm
-    R[q, q] = s
-    first = d[q] - s
-    half = norm * (norm + abs(d[q]))  # v'v / 2
-    w[:] = 0.0
-    for i in range(q, n):
-        v = first if i == q else d[i]
-        if v != 0.0:
-            for c in range(n):
-                w[c] += v * JT[i, c]
-    for i in range(q, n):
-        v = (first if i == q else d[i]) / half
-        if v != 0.0:
-            for c in range(n):
-                JT[i, c] -= v * w[c]
-
-
-@numba.njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
-def _drop(JT: Any, R: Any, d: Any, q: int, at: int) -> None:
-    """Take column ``at`` out of R (q columns); keep R triangular by rotations, of JT and d too."""
-    n = JT.shape[0]
-    for column in range(at, q - 1):
-        for i in range(column + 2):
-            R[i, column] = R[i, column + 1]
-        a, b = R[column, column], R[column + 1, column]
-        h = math.hypot(a, b)
-        if b == 0.0:
-            continue
-        c, s = a / h, b / h
-        R[column, column], R[column + 1, column] = h, 0.0
-        for j in range(column + 2, q):
-            x, y = R[column, j], R[column + 1, j]
-            R[column, j], R[column + 1, j] = c * x + s * y, c * y - s * x
-        for j in range(n):
-            x, y = JT[column, j], JT[column + 1, j]
-            JT[column, j], JT[column + 1, j] = c * x + s * y, c * y - s * x
-        x, y = d[column], d[column + 1]
-        d[column], d[column + 1] = c * x + s * y, c * y - s * x
+INACCURATE = 5
+WORDS = (
+    "optimal",
+    "infeasible",
+    "too many iterations",
+    "not convex",
+    "not finite",
+    "equalities not met",
+)
+DEPENDENT = 1e-20
+"""Square of the sine, in the metric of H, of the angle below which a row depends on others."""
 
 
 @numba.njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
@@ -183,8 +78,9 @@ def _select(
     box_weight: Any,
     row_weight: Any,
     floor: float,
+    equal: Any,
 ) -> int:
-    """Number of the constraint with the greatest violation^2 / weight.
+    """Number of the inequality with the greatest violation^2 / weight.
 
     -1: none is violated; -2: one of them cannot be told.
     """
@@ -201,11 +97,77 @@ def _select(
         for j in range(per_step):
             over = -room[k, j]
             if over > tolerance and over * over > best * max(row_weight[k, j], floor):
+                if equal[j]:  # they are in the working set
+                    continue
                 best = over * over / max(row_weight[k, j], floor)
                 chosen = 2 * n + k * per_step + j
             if math.isnan(over):
                 return -2
     return chosen
+
+
+@numba.njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
+def _equalities_hold(room: Any, bound: Any, equal: Any, tolerance: float) -> bool:
+    for j in range(equal.shape[0]):
+        if equal[j]:
+            for k in range(room.shape[0]):
+                if bound[k, j] != math.inf and not abs(room[k, j]) <= tolerance:
+                    return False
+    return True
+
+
+@numba.njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
+def _add_equalities(
+    S: Any,
+    g: Any,
+    width: Any,
+    normal: Any,
+    bound: Any,
+    family: Any,
+    equal: Any,
+    tolerance: float,
+    JT: Any,
+    R: Any,
+    d: Any,
+    r: Any,
+    step: Any,
+    row: Any,
+    z: Any,
+    active: Any,
+    multiplier: Any,
+) -> tuple[int, int]:
+    """Onto the equalities, one after the other; returns status and how many there are.
+
+    One that depends on those before it is passed over when it agrees with them.
+    """
+    n, q = z.shape[0], 0
+    for k in range(bound.shape[0]):
+        for j in range(bound.shape[1]):
+            if not equal[j] or bound[k, j] == math.inf:
+                continue
+            violation = -write_row(S, g, width, normal, bound, family, k, j, row)
+            violation += dot(row, z)
+            if not math.isfinite(violation):
+                return NOT_FINITE, q
+            for i in range(n):
+                d[i] = -dot(JT[i], row)
+            fixed, free = dot(d[:q], d[:q]), dot(d[q:], d[q:])
+            if free <= DEPENDENT * (free + fixed):
+                if abs(violation) > tolerance:
+                    return INFEASIBLE, q
+                continue
+            length = violation / free  # of either sign, as the multiplier of an equality
+            for i in range(q - 1, -1, -1):
+                r[i] = (d[i] - dot(R[i, i + 1 : q], r[i + 1 : q])) / R[i, i]
+            for i in range(q):
+                multiplier[i] -= length * r[i]
+            add_column(JT, R, d, q, math.sqrt(free), step)
+            for c in range(n):
+                z[c] += length * R[q, q] * JT[q, c]
+            active[q] = 2 * n + k * bound.shape[1] + j
+            multiplier[q] = length
+            q += 1
+    return OPTIMAL, q
 
 
 @numba.njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
@@ -220,6 +182,7 @@ def solve(
     normal: Any,
     bound: Any,
     family: Any,
+    equal: Any,
     tolerance: float,
     limit: int,
     z: Any,
@@ -235,6 +198,7 @@ def solve(
     S ``(K, o, nu)``, g ``(K, o)``, width ``(K,)``: see outputs.
     normal ``(K, o, r)``, bound ``(K, r)``, family ``(r,)``: rows normal . y - slack <= bound; the
     slack of a row is z[nu + family], none where family < 0. A bound of inf switches a row off.
+    equal ``(r,)`` bool: those rows hold with equality, and have no slack.
     tolerance: of a row, in its own unit. limit: of iterations.
     active ``(n,)`` int: in, ``guessed`` constraints to try first; out, the working set. Numbers:
     i: z_i >= low_i; n + i: z_i <= high_i; 2n + k r + j: row j of step k.
@@ -248,7 +212,7 @@ def solve(
     room, change = np.empty(bound.shape), np.empty(bound.shape)
     zero_g, zero_bound = np.zeros(g.shape), np.zeros(bound.shape)
     box_weight, row_weight, floor = np.zeros(n), np.zeros(bound.shape), 1.0
-    if not _inverse_factor(H, L, JT):
+    if not inverse_factor(H, L, JT):
         return NOT_CONVEX, 0, 0
     for i in range(n):  # z = -J J' f
         total = 0.0
@@ -260,7 +224,30 @@ def solve(
         for c in range(i + 1):
             z[c] -= JT[i, c] * d[i]
     guess = active[:guessed].copy()
-    tried, q, iterations = 0, 0, 0
+    tried, iterations, q = 0, 0, 0
+    if equal.any():
+        status, q = _add_equalities(
+            S,
+            g,
+            width,
+            normal,
+            bound,
+            family,
+            equal,
+            tolerance,
+            JT,
+            R,
+            d,
+            r,
+            step,
+            row,
+            z,
+            active,
+            multiplier,
+        )
+        if status != OPTIMAL:
+            return status, iterations, q
+    equalities = q  # the first of the working set; they stay
     weighed = False  # weights are kept from the first constraint on that was not guessed
     exact = False  # whether room is what z leaves, not the sum of its changes
     stale = True  # whether room knows nothing of z
@@ -270,21 +257,22 @@ def solve(
         while chosen < 0 and tried < guessed:
             candidate = guess[tried]
             tried += 1
-            if not _contains(active, q, candidate):
+            if not _contains(active, q, candidate) and not _is_equality(candidate, n, equal):
                 right = _normal_form(
                     candidate, n, low, high, S, g, width, normal, bound, family, row
                 )
-                if _dot(row, z) - right > tolerance:
+                if dot(row, z) - right > tolerance:
                     chosen = candidate
         while chosen < 0:
             if stale:
                 _rooms_of(z, S, g, width, normal, bound, family, y, slack, room)
                 stale, exact = False, True
-            chosen = _select(z, low, high, room, tolerance, box_weight, row_weight, floor)
+            chosen = _select(z, low, high, room, tolerance, box_weight, row_weight, floor, equal)
             if chosen == -2:
                 return NOT_FINITE, iterations, q
             if chosen < 0 and exact:
-                return OPTIMAL, iterations, q
+                good = _equalities_hold(room, bound, equal, tolerance)
+                return OPTIMAL if good else INACCURATE, iterations, q
             if chosen < 0:
                 stale = True
             elif not weighed:
@@ -292,25 +280,28 @@ def solve(
                     _rooms_of(JT[i], S, zero_g, width, normal, zero_bound, family, y, slack, change)
                     _weigh(1.0, JT[i], change, box_weight, row_weight)
                 floor = 1e-10 * box_weight.max()
+                if floor == 0.0:  # the guess filled the space: no direction is left to weigh
+                    for c in range(n):
+                        floor = max(floor, 1e-10 * dot(JT[:, c], JT[:, c]))
                 weighed, chosen = True, -1
         right = _normal_form(chosen, n, low, high, S, g, width, normal, bound, family, row)
         # 2. towards it, dropping constraints whose multipliers would turn negative
         for i in range(n):
-            d[i] = -_dot(JT[i], row)
-        violation = _dot(row, z) - right
+            d[i] = -dot(JT[i], row)
+        violation = dot(row, z) - right
         added = 0.0
         while True:
             iterations += 1
             if iterations > limit:
                 return TOO_MANY_ITERATIONS, iterations, q
-            fixed, free = _dot(d[:q], d[:q]), _dot(d[q:], d[q:])
+            fixed, free = dot(d[:q], d[:q]), dot(d[q:], d[q:])
             for i in range(q - 1, -1, -1):
-                r[i] = (d[i] - _dot(R[i, i + 1 : q], r[i + 1 : q])) / R[i, i]
+                r[i] = (d[i] - dot(R[i, i + 1 : q], r[i + 1 : q])) / R[i, i]
             dual, blocking = math.inf, -1
-            for i in range(q):
+            for i in range(equalities, q):
                 if r[i] > 0.0 and multiplier[i] < dual * r[i]:
                     dual, blocking = multiplier[i] / r[i], i
-            dependent = free <= 1e-20 * (free + fixed)
+            dependent = free <= DEPENDENT * (free + fixed)
             if dependent and blocking < 0:
                 return INFEASIBLE, iterations, q
             whole = not dependent and violation <= dual * free
@@ -319,7 +310,7 @@ def solve(
             for i in range(q):
                 multiplier[i] -= length * r[i]
             if whole:
-                _add(JT, R, d, q, math.sqrt(free), step)
+                add_column(JT, R, d, q, math.sqrt(free), step)
                 # the row of JT that was turned into the new one is the direction of the step
                 move = length * R[q, q]
                 for c in range(n):
@@ -339,8 +330,8 @@ def solve(
                     for c in range(n):
                         z[c] += length * d[i] * JT[i, c]
                 stale = True
-                violation = _dot(row, z) - right
-            _drop(JT, R, d, q, blocking)
+                violation = dot(row, z) - right
+            drop_column(JT, R, d, q, blocking)
             for i in range(blocking, q - 1):
                 active[i], multiplier[i] = active[i + 1], multiplier[i + 1]
             q -= 1
@@ -349,12 +340,9 @@ def solve(
                 _weigh(1.0, JT[q], change, box_weight, row_weight)
 
 
-@numba.njit(cache=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
-def _dot(a: Any, b: Any) -> float:
-    total = 0.0
-    for i in range(a.shape[0]):
-        total += a[i] * b[i]
-    return float(total)
+@numba.njit(cache=True)
+def _is_equality(number: int, n: int, equal: Any) -> bool:
+    return number >= 2 * n and bool(equal[(number - 2 * n) % equal.shape[0]])
 
 
 @numba.njit(cache=True)

@@ -6,17 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from push_model import CurvatureLimits, DifferentialDrive
-from push_mpc import (
-    ActiveSetBackend,
-    DaqpBackend,
-    LtvMpc,
-    MpcSettings,
-    OsqpBackend,
-    Qp,
-    Reference,
-    backend,
-)
-from push_mpc import active_set as kernel
+from push_mpc import LtvMpc, MpcSettings, Reference
+from push_qp import ActiveSetBackend, DaqpBackend, OsqpBackend, Qp, backend, factors
+from push_qp import goldfarb_idnani as kernel
+from push_qp.active_set import iteration_limit
 
 BACKENDS = {"active_set": ActiveSetBackend, "daqp": DaqpBackend, "osqp": lambda: OsqpBackend(1e-9)}
 SEEDS = st.integers(0, 10**6)
@@ -35,10 +28,14 @@ def assert_optimal(qp, z, tolerance=1e-6):
     """Karush, Kuhn, Tucker: feasible, and -gradient in the cone of the tight normals."""
     from scipy.optimize import nnls
 
-    G, b = qp.rows(qp.all_rows())
+    numbers = qp.all_rows()
+    G, b = qp.rows(numbers)
+    equal = qp.equalities(numbers)
+    assert qp.violation(z) < tolerance
+    assert G[equal] @ z == pytest.approx(b[equal], abs=tolerance)
     eye = np.eye(len(z))
-    normals, right = np.vstack([G, eye, -eye]), np.concatenate([b, qp.high, -qp.low])
-    room = right - normals @ z
+    normals = np.vstack([G, -G[equal], eye, -eye])
+    room = np.concatenate([b, -b[equal], qp.high, -qp.low]) - normals @ z
     assert room.min() > -tolerance
     gradient = qp.H @ z + qp.f
     if np.abs(gradient).max() > tolerance:
@@ -70,6 +67,23 @@ def test_start_from_any_working_set_gives_the_same_answer(seed, other, rows):
     warm = ActiveSetBackend()
     warm.solve(strange)
     assert warm.solve(qp).z == pytest.approx(ActiveSetBackend().solve(qp).z, abs=1e-8)
+
+
+def test_a_guess_that_fills_the_space_is_no_trouble():
+    """As many rows are guessed as there are unknowns, and others are violated at that vertex."""
+    filled = 0
+    for seed in range(200):
+        random = np.random.default_rng(seed)
+        G, f = random.normal(size=(30, 4)), random.normal(size=4) * 100
+        first = Qp.dense(np.eye(4), f, G, np.ones(30), np.full(4, -9.0), np.full(4, 9.0))
+        solver = ActiveSetBackend()
+        solver.solve(first)
+        filled += solver._count == 4
+        moved = Qp.dense(np.eye(4), f, G, random.uniform(0.1, 1, 30), first.low, first.high)
+        result = solver.solve(moved)
+        assert result.solved, result.status
+        assert_optimal(moved, result.z)
+    assert filled > 100
 
 
 def test_start_from_its_own_working_set_takes_one_iteration_a_constraint():
@@ -135,16 +149,30 @@ def test_rows_written_out_are_the_rows_of_the_outputs():
         assert b - G @ z == pytest.approx(qp.rooms(z)[numbers], abs=1e-12)
 
 
-def tick_programme(random):
-    p = 20
+def tick_programme(random, p=20, obstacles=20):
     t = 0.1 * np.arange(p + 1)
     reference = Reference(
         np.column_stack([0.07 * t, 0 * t, 0 * t]), np.tile([0.07, 0.0, 0.0], (p + 1, 1))
     )
-    circles = np.column_stack([random.uniform(0, 0.3, (20, 2)), np.full(20, 0.045)])
+    centres = random.uniform(0, 0.015 * p, (obstacles, 2))
+    circles = np.column_stack([centres, np.full(obstacles, 0.045)])
     error = random.normal(size=5) * [0.01, 0.02, 0.2, 0.02, 0.2]
-    mpc = LtvMpc(MpcSettings(), DifferentialDrive(0.0205, 0.0265, 6.28))
+    settings = MpcSettings(horizon=p, max_obstacles=obstacles)
+    mpc = LtvMpc(settings, DifferentialDrive(0.0205, 0.0265, 6.28))
     return mpc.programme(error, reference, CurvatureLimits(-1.8, 1.8), circles)
+
+
+def test_the_cap_on_iterations_grows_with_the_programme():
+    """The longest horizon, from a working set of another world: more than 500 are needed."""
+    solver, most = ActiveSetBackend(), 0
+    for seed in range(20):
+        qp = tick_programme(np.random.default_rng(seed), 100, 100)
+        result = solver.solve(qp)
+        assert result.solved, result.status
+        most = max(most, int(result.status.split()[-2]))
+    assert most > 500
+    assert iteration_limit(qp) > 2 * most
+    assert iteration_limit(qp) > 4 * iteration_limit(tick_programme(np.random.default_rng(0)))
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -172,7 +200,7 @@ def test_first_weights_are_the_inverse_hessian_in_the_rows():
     qp = tick_programme(np.random.default_rng(1))
     n = len(qp.f)
     JT, L = np.empty((n, n)), np.empty((n, n))
-    assert kernel._inverse_factor(qp.H, L, JT)
+    assert factors.inverse_factor(qp.H, L, JT)
     box, row = np.zeros(n), np.zeros(qp.bound.shape)
     change = np.empty(qp.bound.shape)
     zero_g, zero_bound = np.zeros(qp.g.shape), np.zeros(qp.bound.shape)

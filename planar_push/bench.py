@@ -1,0 +1,19 @@
+"""Measure speed and physics, rivals beside."""
+
+import argparse
+from pathlib import Path
+
+from benchmarks import NAMES
+
+
+def add_words(parser: argparse.ArgumentParser) -> None:
+    """The words of this verb."""
+    parser.add_argument("what", nargs="?", default="all", choices=["all", *NAMES])
+    parser.add_argument("--out", default="", help="folder for the JSON")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 when every bound holds."""
+    from benchmarks import run as run_benchmarks
+
+    return run_benchmarks(arguments.what, Path(arguments.out) if arguments.out else None)

@@ -1,0 +1,37 @@
+"""Many seeded trials, a summary, plots, a bag; goes on where it was interrupted."""
+
+import argparse
+import time
+from pathlib import Path
+
+from planar_push.words import whole
+
+
+def add_words(parser: argparse.ArgumentParser) -> None:
+    """The words of this verb."""
+    parser.add_argument("name", help="e.g. single-robot")
+    parser.add_argument("--scenarios", default="", help="comma-separated; the experiment's own")
+    parser.add_argument("--trials", type=whole(1), default=5, help="of each scenario")
+    parser.add_argument("--seed", type=whole(0), default=1, help="of the first trial")
+    parser.add_argument("--out", default="", help="folder; one that has the beginning is gone on")
+    parser.add_argument("--scheduler", default="", help="address of a Dask scheduler")
+    parser.add_argument("--workers", type=whole(0), default=0, help="processes here; 0: one a core")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 when every trial was run and at least one succeeded."""
+    from push_study.study import StudyOptions, complete, experiment, run_study
+
+    given = tuple(s for s in arguments.scenarios.split(",") if s)
+    out = arguments.out or f"results/{arguments.name}-{time.strftime('%Y%m%d-%H%M%S')}"
+    options = StudyOptions(
+        given or experiment(arguments.name).SCENARIOS,
+        arguments.trials,
+        arguments.seed,
+        Path(out),
+        arguments.scheduler,
+        arguments.workers,
+    )
+    summary = run_study(arguments.name, options)
+    print(f"\n{out}/summary.json")
+    return 0 if complete(summary) else 1

@@ -1,0 +1,44 @@
+"""Send a goal pose and follow the job."""
+
+import argparse
+import sys
+
+from planar_push.words import add_namespace, add_timeout, finite, tell
+from push_bringup.systems import check_namespace
+from push_model.jobs import JobError
+
+_PATIENCE = 10.0  # [s] wall time for the suite to be found
+
+
+def add_words(parser: argparse.ArgumentParser) -> None:
+    """The words of this verb."""
+    parser.add_argument("x", type=finite, help="[m]")
+    parser.add_argument("y", type=finite, help="[m]")
+    parser.add_argument("theta", type=finite, help="[rad]")
+    parser.add_argument("--team", default="", help="whose goal it is, where there are teams")
+    parser.add_argument("--no-wait", action="store_true")
+    add_timeout(parser, 300.0)
+    add_namespace(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 when the job ends well, or waits to be executed."""
+    from push_bringup.monitor import Monitor
+
+    check_namespace(arguments.namespace)
+    check_namespace(arguments.team)
+    with Monitor(arguments.namespace, arguments.team, on_event=tell) as monitor:
+        if not monitor.connect(_PATIENCE):
+            print(
+                f"error: {monitor.missing()}; start a suite with: planar-push launch single",
+                file=sys.stderr,
+            )
+            return 1
+        monitor.send_goal((arguments.x, arguments.y, arguments.theta))
+        if arguments.no_wait:
+            return 0
+        result = monitor.follow(arguments.timeout, lambda: monitor.supervised)
+    if result.code is JobError.NONE:
+        return 0
+    print(f"error: {result.reason}", file=sys.stderr)
+    return 1

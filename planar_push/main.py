@@ -1,0 +1,55 @@
+"""The command line: ``planar-push``. Each verb is a file of this package, with its words and what
+it does; this one is the grammar."""
+
+import argparse
+import importlib
+import pkgutil
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from push_bringup.failures import DomainInUse, SuiteFailed
+from push_model.settings import SettingsError
+from push_ros.process import prepare_environment
+
+NOT_VERBS = ("main", "words", "__main__")
+
+
+def verbs() -> list[str]:
+    """Names of the modules that are verbs: each has ``add_words`` and ``run``."""
+    found = (m.name for m in pkgutil.iter_modules([str(Path(__file__).parent)]))
+    return sorted(name for name in found if name not in NOT_VERBS)
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line's grammar."""
+    top = argparse.ArgumentParser(
+        prog="planar-push", description="Make mobile robots move things by pushing them."
+    )
+    commands = top.add_subparsers(required=True, metavar="COMMAND")
+    for name in verbs():
+        verb = importlib.import_module(f"planar_push.{name}")
+        text = (verb.__doc__ or "").split("\n")[0].rstrip(".")
+        text = text[:1].lower() + text[1:]
+        command = commands.add_parser(name.replace("_", "-"), help=text, description=verb.__doc__)
+        command.set_defaults(run=verb.run)
+        verb.add_words(command)
+    return top
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Entry point; returns the exit code: 2 for what was wrong before anything started."""
+    prepare_environment()
+    arguments = parser().parse_args(words)
+    try:
+        return int(arguments.run(arguments))
+    except (SettingsError, FileExistsError, FileNotFoundError, DomainInUse) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    except SuiteFailed as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,19 @@
+"""Copy what can be read of a cut-off bag."""
+
+import argparse
+from pathlib import Path
+
+
+def add_words(parser: argparse.ArgumentParser) -> None:
+    """The words of this verb."""
+    parser.add_argument("bag")
+    parser.add_argument("--out", required=True, help="folder of the new bag")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 when anything could be read."""
+    from push_record.bag import recover
+
+    count = recover(Path(arguments.bag), Path(arguments.out))
+    print(f"{count} messages recovered into {arguments.out}")
+    return 0 if count else 1

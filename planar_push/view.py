@@ -1,0 +1,45 @@
+"""A live view in the browser; goals by mouse."""
+
+import argparse
+import sys
+
+from planar_push.words import add_namespace, add_scenario, whole
+from push_bringup.systems import check_namespace
+
+
+def add_words(parser: argparse.ArgumentParser) -> None:
+    """The words of this verb."""
+    add_scenario(parser, None)
+    add_namespace(parser)
+    parser.add_argument("--host", default="127.0.0.1", help="address to serve on")
+    parser.add_argument("--port", type=whole(0), default=8080, help="0: any that is free")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Serve until a signal."""
+    from push_ros.process import run_node
+    from push_scenario.scenario import load_scenario
+    from push_view.page_server import PageServer
+    from push_view.viewer_node import ViewerNode
+
+    check_namespace(arguments.namespace)
+    # without one the page waits for the scenario that the bridge tells
+    scenario = load_scenario(arguments.scenario) if arguments.scenario else None
+    server: PageServer | None = None
+
+    def make() -> ViewerNode:
+        nonlocal server
+        node = ViewerNode(scenario)
+        server = PageServer(node, arguments.host, arguments.port)
+        print(f"http://{arguments.host}:{server.port}/", flush=True)
+        return node
+
+    words = ["--ros-args", "-r", f"__ns:=/{arguments.namespace.strip('/')}"]
+    try:
+        return int(run_node(make, words if arguments.namespace else []))
+    except OSError as error:
+        print(f"error: port {arguments.port}: {error.strerror}; try --port 0", file=sys.stderr)
+        return 2
+    finally:
+        if server is not None:
+            server.close()

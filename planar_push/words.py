@@ -1,0 +1,97 @@
+"""Words that several verbs have in common, with their checks."""
+
+import argparse
+import math
+import signal
+from collections.abc import Callable
+
+from push_bringup.job_result import JobEvent
+from push_bringup.systems import SYSTEMS
+
+
+def add_scenario(parser: argparse.ArgumentParser, default: str | None = "env1-target1") -> None:
+    """``--scenario``; without a default it is heard from the bridge."""
+    silent = "" if default else "; what the running bridge publishes when it is not given"
+    parser.add_argument(
+        "--scenario",
+        default=default or "",
+        help=f"a name in config/scenarios, or a file{silent}",
+    )
+
+
+def add_namespace(parser: argparse.ArgumentParser) -> None:
+    """``--namespace``."""
+    parser.add_argument("--namespace", default="", help="of the whole suite, e.g. a or lab/a")
+
+
+def add_factor(parser: argparse.ArgumentParser) -> None:
+    """``--factor``."""
+    parser.add_argument(
+        "--factor",
+        type=positive,
+        default=None,
+        help="sim time over wall time, instead of the scenario's",
+    )
+
+
+def add_timeout(parser: argparse.ArgumentParser, default: float) -> None:
+    """``--timeout``."""
+    parser.add_argument("--timeout", type=positive, default=default, help="[s] wall time")
+
+
+def add_system(parser: argparse.ArgumentParser) -> None:
+    """The system, of those that are there."""
+    parser.add_argument("system", choices=list(SYSTEMS), nargs="?", default="single")
+
+
+def positive(text: str) -> float:
+    """A positive, finite number."""
+    value = finite(text)
+    if value <= 0.0:
+        raise argparse.ArgumentTypeError(f"expected a positive number, got {text}")
+    return value
+
+
+def finite(text: str) -> float:
+    """A finite number."""
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"expected a number, got '{text}'") from None
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"expected a finite number, got '{text}'")
+    return value
+
+
+def whole(least: int) -> Callable[[str], int]:
+    """A whole number from ``least`` on."""
+
+    def parse(text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"expected a whole number, got '{text}'") from None
+        if value < least:
+            raise argparse.ArgumentTypeError(f"expected at least {least}, got {value}")
+        return value
+
+    return parse
+
+
+def stop_on_signals(request_stop: Callable[[], None]) -> None:
+    """SIGINT and SIGTERM call a function, as long as nobody says otherwise."""
+
+    def handler(number: int, frame: object) -> None:
+        request_stop()
+
+    signal.signal(signal.SIGINT, handler)
+    signal.signal(signal.SIGTERM, handler)
+
+
+def tell(event: JobEvent) -> None:
+    """Print what becomes of a job."""
+    team = f"{event.team}: " if event.team else ""
+    if event.kind == "state":
+        print(f"  {team}{event.state:12s} {event.reason}", flush=True)
+    elif event.distance is not None:
+        print(f"  {team}{event.distance:6.3f} m to go", flush=True)

@@ -1,0 +1,185 @@
+"""The systems: which nodes make one up, for whom, and where they live.
+
+One list serves the launcher (a process a node), lockstep (all nodes in one process) and the tests.
+A further system is a function that returns such a list, and a row in ``SYSTEMS``.
+"""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from rclpy.node import Node
+
+from push_model.settings import SettingsError
+from push_ros.names import inside, space
+from push_scenario.scenario import Scenario
+from push_scenario.teams import Team
+
+LIVE: dict[str, dict[str, Any]] = {"controller": {"tracker": {"deadline": 0.03}}}
+"""Settings of live use, where the scenario is silent. A run in lockstep must not depend on the wall
+clock: there a solve has no deadline [s]."""
+
+MODULES = {
+    "bridge": "sim_bridge.node",
+    "planner": "push_planner.node",
+    "controller": "push_mpc.node",
+    "supervisor": "push_supervisor.node",
+    "recorder": "push_record.recorder",
+}
+"""Kind of a node to the module whose ``main`` runs it in a process of its own."""
+
+
+@dataclass(frozen=True)
+class NodeSpec:
+    """A node of a system.
+
+    name: what it is called in messages to people; unique in the system.
+    kind: key of ``MODULES``. namespace: where it lives. world: namespace of the bridge.
+    robot, item, team: whom it serves; empty where it serves all.
+    parameters: further ROS parameters. remaps: names to names, besides the namespace.
+    """
+
+    name: str
+    kind: str
+    namespace: str
+    world: str
+    robot: str = ""
+    item: str = ""
+    team: str = ""
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    remaps: Mapping[str, str] = field(default_factory=dict)
+
+    def words(self, scenario: str) -> list[str]:
+        """Command line of its process; scenario: name or path of the file that it reads."""
+        values: dict[str, Any] = {"scenario": scenario, **self.parameters}
+        if self.kind in ("planner", "supervisor", "recorder"):
+            values["world"] = self.world
+        if self.kind in ("controller", "supervisor"):
+            values["robot"] = self.robot
+        if self.kind == "supervisor":
+            values["object"] = self.item
+        remaps = {"__ns": self.namespace, **self.remaps}
+        words = ["--ros-args"]
+        for name, to in remaps.items():
+            words += ["-r", f"{name}:={to}"]
+        for name, value in values.items():
+            words += ["-p", f"{name}:={json.dumps(value)}"]
+        return words
+
+    def make(self, scenario: Scenario) -> Node:
+        """The node in this process, e.g. for a run in lockstep; a bridge waits to be started."""
+        return _MAKERS[self.kind](self, scenario)
+
+
+def _bridge(spec: NodeSpec, scenario: Scenario) -> Node:
+    from sim_bridge.node import BridgeNode
+
+    return BridgeNode(scenario, autostart=False, namespace=spec.namespace)
+
+
+def _planner(spec: NodeSpec, scenario: Scenario) -> Node:
+    from push_planner.node import PlannerNode
+
+    return PlannerNode(scenario, namespace=spec.namespace, world=spec.world)
+
+
+def _controller(spec: NodeSpec, scenario: Scenario) -> Node:
+    from push_mpc.node import ControllerNode
+
+    return ControllerNode(scenario, spec.robot, namespace=spec.world)
+
+
+def _supervisor(spec: NodeSpec, scenario: Scenario) -> Node:
+    from push_supervisor.node import SupervisorNode
+
+    return SupervisorNode(
+        scenario, spec.robot, spec.item, namespace=spec.namespace, world=spec.world
+    )
+
+
+_MAKERS: dict[str, Callable[[NodeSpec, Scenario], Node]] = {
+    "bridge": _bridge,
+    "planner": _planner,
+    "controller": _controller,
+    "supervisor": _supervisor,
+}
+
+
+def teams_of(scenario: Scenario) -> tuple[Team, ...]:
+    """The teams of a scenario; the unnamed one where it names none."""
+    return tuple(scenario.teams.values()) or (scenario.team(),)
+
+
+def team_space(namespace: str, team: str) -> str:
+    """Namespace of a team; that of the world for the unnamed one."""
+    return inside(namespace, team) if team else _absolute(namespace)
+
+
+def _absolute(namespace: str) -> str:
+    return space(namespace).rstrip("/") or "/"
+
+
+def single(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
+    """One robot that pushes one object, for each team; all in one world.
+
+    A robot or object of no team stands in the way of the others.
+
+    Raises
+    ------
+    SettingsError: a team has not one robot, or no object.
+    """
+    world = _absolute(namespace)
+    nodes = [NodeSpec("bridge", "bridge", world, world)]
+    for team in teams_of(scenario):
+        if len(team.robots) != 1:
+            whose = f"team '{team.name}'" if team.name else "its only team"
+            raise SettingsError(
+                f"scenario '{scenario.name}': {whose} has {len(team.robots)} robots, the system "
+                "'single' takes one a team; say under 'teams' who moves what"
+            )
+        if not team.object:
+            raise SettingsError(f"scenario '{scenario.name}' has no object to push")
+        robot, item, place = team.robots[0], team.object, team_space(namespace, team.name)
+        prefix = f"{team.name}/" if team.name else ""
+        own = inside(namespace, robot)
+        nodes += [
+            NodeSpec(f"{prefix}controller", "controller", own, world, robot, item, team.name),
+            NodeSpec(f"{prefix}planner", "planner", place, world, robot, item, team.name),
+            NodeSpec(f"{prefix}supervisor", "supervisor", place, world, robot, item, team.name),
+        ]
+    return tuple(nodes)
+
+
+SYSTEMS: dict[str, Callable[[Scenario, str], tuple[NodeSpec, ...]]] = {"single": single}
+"""Name of a system to the function that lists its nodes for a scenario in a namespace."""
+
+
+def nodes_of(system: str, scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
+    """The nodes of a system.
+
+    Raises
+    ------
+    SettingsError: there is no such system, the scenario does not suit it, or the namespace is none.
+    """
+    if system not in SYSTEMS:
+        known = ", ".join(SYSTEMS)
+        raise SettingsError(f"no system called '{system}'; expected one of: {known}")
+    check_namespace(namespace)
+    return SYSTEMS[system](scenario, namespace)
+
+
+def check_namespace(namespace: str) -> None:
+    """Raise SettingsError for what ROS would not take: names of letters, digits, underscores."""
+    for part in namespace.strip("/").split("/") if namespace.strip("/") else []:
+        if not (part.isascii() and part.isidentifier()):
+            raise SettingsError(
+                f"namespace '{namespace}': expected names of letters, digits and underscores, "
+                "with slashes between them, none of which begins with a digit"
+            )
+
+
+def recorder(out: str, namespace: str = "") -> NodeSpec:
+    """A recorder of the world in a namespace and of all its teams; out: bag folder."""
+    world = _absolute(namespace)
+    return NodeSpec("recorder", "recorder", world, world, parameters={"out": out})

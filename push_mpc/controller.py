@@ -1,0 +1,82 @@
+"""What every predictive controller offers to the tracker."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from push_model.arrays import Array
+from push_model.kinematics import DifferentialDrive
+from push_model.stable_push import CurvatureLimits
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What to track over the horizon.
+
+    pose: ``(p + 1, 3)`` world frame; twist: ``(p + 1, 3)`` v_d, w_d, omega_d of that frame, in it.
+    """
+
+    pose: Array
+    twist: Array
+
+
+@dataclass(frozen=True)
+class MpcResult:
+    """acceleration: (a, epsilon) to apply now; solve_time [s] CPU.
+
+    slack: greatest violation of a softened row, as a part of what is allowed: 1 is at the bound.
+    solved is False when the acceleration must not be used; reason says why. late: only because it
+    came after its deadline.
+    """
+
+    acceleration: tuple[float, float]
+    solved: bool
+    slack: float
+    solve_time: float
+    reason: str
+    late: bool = False
+
+
+class PredictiveController(Protocol):
+    """Finds accelerations of one robot; may remember its last solution."""
+
+    @property
+    def drive(self) -> DifferentialDrive:
+        """Of the robot."""
+        ...
+
+    @property
+    def horizon(self) -> int:
+        """p, steps predicted."""
+        ...
+
+    @property
+    def step(self) -> float:
+        """[s] of the prediction."""
+        ...
+
+    @property
+    def max_obstacles(self) -> int:
+        """How many circles it takes."""
+        ...
+
+    def solve(
+        self, error: Array, reference: Reference, limits: CurvatureLimits | None, circles: Array
+    ) -> MpcResult:
+        """One step.
+
+        Parameters
+        ----------
+        error: ``(5,)`` of (2.37): e_x, e_y, e_theta, e_v, e_omega.
+        reference: over the horizon, first sample now.
+        limits: stable curvatures now, in a push; None when the robot moves alone.
+        circles: ``(m, 3)`` x, y, least distance of the axle midpoint; m <= max_obstacles.
+        """
+        ...
+
+    def warm_up(self) -> None:
+        """Compile and solve once, so that the first command does not wait."""
+        ...
+
+    def reset(self) -> None:
+        """Forget the previous solution."""
+        ...

@@ -1,0 +1,38 @@
+"""The predictive controllers by name: a file each, and a line here."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from push_model.kinematics import DifferentialDrive
+from push_model.settings import SettingsError
+from push_mpc.controller import PredictiveController
+from push_mpc.ltv_mpc import LtvMpc
+from push_mpc.settings import MpcSettings
+
+
+@dataclass(frozen=True)
+class ControllerKind:
+    """settings: the dataclass that configures it; make: from such settings and a drive."""
+
+    settings: type[Any]
+    make: Callable[[Any, DifferentialDrive], PredictiveController]
+
+
+CONTROLLERS: dict[str, ControllerKind] = {
+    "ltv": ControllerKind(MpcSettings, LtvMpc),
+}
+
+
+def controller_kind(name: str) -> ControllerKind:
+    """The controller of this name.
+
+    Raises
+    ------
+    SettingsError: there is none.
+    """
+    if name not in CONTROLLERS:
+        raise SettingsError(
+            f"unknown controller '{name}'; expected one of: {', '.join(sorted(CONTROLLERS))}"
+        )
+    return CONTROLLERS[name]

@@ -1,0 +1,64 @@
+"""How far the reference has come: it waits for a robot that lags behind."""
+
+import math
+
+import numpy as np
+
+from push_model.arrays import Array
+from push_model.trajectory import Trajectory
+from push_mpc.controller import Reference
+from push_mpc.settings import TrackerSettings
+
+# Of the nominal pace. Slower than that, the reference stands still: before a robot that does not
+# move it approaches lag_end for ever, and never quite comes to rest.
+_HALTED = 0.02
+
+
+class ReferenceClock:
+    """The time of a trajectory, which runs slower than the clock when the robot lags behind.
+
+    time: [s] of the trajectory; halted: [s] for which it has not moved on.
+    """
+
+    def __init__(self, settings: TrackerSettings, trajectory: Trajectory) -> None:
+        self._settings = settings
+        self.trajectory = trajectory
+        self.time = 0.0
+        self.halted = 0.0
+        self._rate = 0.0
+
+    @property
+    def ended(self) -> bool:
+        """Whether the trajectory is over."""
+        return self.time >= self.trajectory.duration
+
+    @property
+    def progress(self) -> float:
+        """Part of the trajectory that is over, 0 to 1."""
+        return min(1.0, self.time / self.trajectory.duration)
+
+    def advance(self, dt: float, lag: float) -> None:
+        """Let dt [s] pass, with the robot lag [m] behind."""
+        s = self._settings
+        self._rate = min(1.0, max(0.0, (s.lag_end - lag) / (s.lag_end - s.lag_begin)))
+        self.halted = self.halted + dt if self._rate < _HALTED and not self.ended else 0.0
+        self.time = min(self.time + self._rate * dt, self.trajectory.duration)
+
+    def reference(self, horizon: int, step: float, shift: Array) -> Reference:
+        """What to track from now on, at the present pace, in frames moved by shift ``(3,)``.
+
+        shift: pose of the wanted robot frame in the trajectory's frame; its twist is that of a
+        frame fixed to the trajectory's, so that it slides sideways when it sits ahead in a bend.
+        """
+        rate = self._rate
+        pose, twist = self.trajectory.sample(self.time + rate * step * np.arange(horizon + 1))
+        v, omega = rate * twist[:, 0], rate * twist[:, 1]
+        c, sn = np.cos(pose[:, 2]), np.sin(pose[:, 2])
+        moved = pose.copy()
+        moved[:, 0] += c * shift[0] - sn * shift[1]
+        moved[:, 1] += sn * shift[0] + c * shift[1]
+        moved[:, 2] += shift[2]
+        ahead, across = v - omega * shift[1], omega * shift[0]
+        ct, st = math.cos(shift[2]), math.sin(shift[2])
+        body = np.column_stack([ct * ahead + st * across, -st * ahead + ct * across, omega])
+        return Reference(moved, body)

@@ -1,0 +1,63 @@
+"""What a tracker is given, and what it answers each tick."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+from push_model.arrays import Array
+from push_model.stable_push import CurvatureLimits
+from push_model.trajectory import Trajectory
+from push_mpc.controller import MpcResult
+
+
+class TrackError(IntEnum):
+    """Why a trajectory ended early; the codes of the FollowTrajectory action."""
+
+    NONE = 0
+    INVALID_GOAL = 201
+    POSES_STALE = 202
+    STUCK = 203
+    CONTACT_LOST = 204
+    OFF_COURSE = 205
+    SOLVER_FAILED = 206
+    TIMEOUT = 207
+
+
+@dataclass(frozen=True)
+class Push:
+    """What a push needs beside its trajectory.
+
+    grasp: ``(3,)`` nominal pose of the object in the robot frame; limits: stable curvatures for it.
+    """
+
+    grasp: Array
+    limits: CurvatureLimits
+
+
+@dataclass(frozen=True)
+class Task:
+    """A trajectory to follow. circles: ``(m, 3)`` x, y, least distance of the axle midpoint [m]."""
+
+    trajectory: Trajectory
+    push: Push | None
+    circles: Array
+    position_tolerance: float
+    orientation_tolerance: float
+
+
+@dataclass(frozen=True)
+class Tick:
+    """Outcome of one tick: command, and whether the task has ended, and how."""
+
+    v: float
+    omega: float
+    finished: bool
+    code: TrackError
+    message: str
+    error: Array
+    progress: float
+    position_error: float
+    orientation_error: float
+    solve: MpcResult | None
+    curvature_margin: float
+    obstacle_margin: float
+    object_offset: float

@@ -1,0 +1,19 @@
+"""Quadratic programmes of predictive controllers, and one interface for every solver of them."""
+
+from push_qp.active_set import ActiveSetBackend
+from push_qp.backends import BACKENDS, backend
+from push_qp.daqp_backend import DaqpBackend
+from push_qp.osqp_backend import OsqpBackend
+from push_qp.programme import Index, Qp, QpBackend, QpSolution
+
+__all__ = [
+    "BACKENDS",
+    "ActiveSetBackend",
+    "DaqpBackend",
+    "Index",
+    "OsqpBackend",
+    "Qp",
+    "QpBackend",
+    "QpSolution",
+    "backend",
+]

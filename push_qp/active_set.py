@@ -1,0 +1,66 @@
+"""Our dual active-set method (push_qp.goldfarb_idnani) as a backend."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from push_model.arrays import Array
+from push_qp import goldfarb_idnani
+from push_qp.programme import Index, Qp, QpSolution
+
+
+def iteration_limit(qp: Qp) -> int:
+    """Iterations until a solve is given up: ten an unknown, and one a row.
+
+    Usual are one to two an active row, and there are no more of these than unknowns; a start from
+    a working set that has nothing to do with the programme may take two or three times as many.
+    """
+    return 10 * len(qp.f) + int(qp.bound.size)
+
+
+@dataclass
+class ActiveSetBackend:
+    """Starts from the last working set."""
+
+    tolerance: float = 1e-8
+    _active: Index = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    _multiplier: Array = field(default_factory=lambda: np.zeros(0))
+    _count: int = 0
+    _shape: tuple[int, ...] = ()
+
+    def solve(self, qp: Qp) -> QpSolution:
+        """See QpBackend."""
+        n = len(qp.f)
+        if self._shape != (n, *qp.bound.shape):  # what was remembered is of other rows
+            self._shape, self._count = (n, *qp.bound.shape), 0
+            self._active, self._multiplier = np.zeros(n, np.int64), np.zeros(n)
+        z = np.empty(n)
+        status, iterations, self._count = goldfarb_idnani.solve(
+            qp.H,
+            qp.f,
+            qp.low,
+            qp.high,
+            qp.S,
+            qp.g,
+            qp.width,
+            qp.normal,
+            qp.bound,
+            qp.family,
+            qp.equal,
+            self.tolerance,
+            iteration_limit(qp),
+            z,
+            self._active,
+            self._multiplier,
+            self._count,
+        )
+        solved = status == goldfarb_idnani.OPTIMAL and bool(np.isfinite(z).all())
+        if not solved:
+            self.reset()
+        return QpSolution(
+            z, solved, f"{goldfarb_idnani.WORDS[status]} after {iterations} iterations"
+        )
+
+    def reset(self) -> None:
+        """See QpBackend."""
+        self._count = 0

@@ -1,0 +1,20 @@
+"""Which state of the source a bag or a study was made with."""
+
+import subprocess
+from pathlib import Path
+
+
+def revision() -> str:
+    """The git revision of the source tree, with a mark when it was changed; empty without git."""
+    here = Path(__file__).resolve().parent
+    try:
+        text = subprocess.run(
+            ["git", "-C", str(here), "describe", "--always", "--dirty", "--abbrev=12"],
+            capture_output=True,
+            text=True,
+            timeout=5,
+            check=True,
+        ).stdout
+    except (OSError, subprocess.SubprocessError):
+        return ""
+    return text.strip()

@@ -1,0 +1,148 @@
+"""A study: an experiment's trials, run or gone on with, and what they amount to."""
+
+import csv
+import importlib
+import json
+import os
+import pkgutil
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from push_model.settings import SettingsError
+from push_record.revision import revision
+from push_study import experiments
+from push_study.cluster import check_cluster
+from push_study.summary import aggregate
+from push_study.trials import Row, run_trials
+
+
+@dataclass(frozen=True)
+class StudyOptions:
+    """scenarios: names or paths. trials: of each. seed: of the first trial; the next has the next.
+
+    scheduler: address of a Dask scheduler; empty for local processes. workers: 0 for one a core.
+    """
+
+    scenarios: tuple[str, ...]
+    trials: int
+    seed: int
+    out: Path
+    scheduler: str = ""
+    workers: int = 0
+
+
+class Experiment(Protocol):
+    """A module of ``push_study.experiments``; its name is the module's, with dashes."""
+
+    SCENARIOS: tuple[str, ...]
+    """Where none are named."""
+
+    def tasks(self, options: StudyOptions) -> Sequence[Any]:
+        """Dataclasses, one a trial, with ``scenario``, ``seed`` and ``out``. It raises
+        SettingsError for scenarios that do not suit it; nothing has been started then."""
+        ...
+
+    def trial(self, task: Any) -> Row:
+        """Run one trial; importable, for it runs in other processes."""
+        ...
+
+    def conclude(self, options: StudyOptions, tasks: Sequence[Any], rows: list[Row]) -> None:
+        """Draw and print what the rows amount to, beside the thesis's figures."""
+        ...
+
+
+def experiment_names() -> list[str]:
+    """All experiments, by the names that people use."""
+    found = pkgutil.iter_modules(experiments.__path__)
+    return sorted(m.name.replace("_", "-") for m in found)
+
+
+def experiment(name: str) -> Experiment:
+    """An experiment by name; raises SettingsError when there is none."""
+    if name not in experiment_names():
+        known = ", ".join(experiment_names())
+        raise SettingsError(f"no experiment called '{name}'; known: {known}")
+    module: Any = importlib.import_module(f"push_study.experiments.{name.replace('-', '_')}")
+    return module  # type: ignore[no-any-return]
+
+
+def run_study(name: str, options: StudyOptions) -> dict[str, Any]:
+    """Run an experiment, or go on with it where its folder has the beginning; returns the summary.
+
+    Raises
+    ------
+    SettingsError: something is wrong with the options; nothing has been started.
+    FileExistsError: the folder holds something else.
+    """
+    what = experiment(name)
+    _check(options)
+    tasks = what.tasks(options)
+    _claim(options.out, {"experiment": name, "seed": options.seed, "revision": revision()})
+    rows = run_trials(
+        what.trial, tasks, options.out / "trials.jsonl", options.scheduler, options.workers
+    )
+    summary = {
+        "experiment": name,
+        "seed": options.seed,
+        "revision": revision(),
+        "requested": len(tasks),
+        "trials": rows,
+        "aggregate": aggregate(rows),
+    }
+    (options.out / "summary.json").write_text(json.dumps(summary, indent=1) + "\n")
+    if rows:
+        _write_table(options.out / "trials.csv", rows)
+    what.conclude(options, tasks, rows)
+    return summary
+
+
+def complete(summary: dict[str, Any]) -> bool:
+    """Whether every trial has a row, and at least one of them succeeded."""
+    rows = summary["trials"]
+    return len(rows) == summary["requested"] and any(r["success"] for r in rows)
+
+
+def _check(options: StudyOptions) -> None:
+    if options.trials < 1:
+        raise SettingsError(f"trials: expected at least 1, got {options.trials}")
+    if options.workers < 0:
+        raise SettingsError(f"workers: expected at least 0, got {options.workers}")
+    if options.seed < 0:
+        raise SettingsError(f"seed: expected at least 0, got {options.seed}")
+    stems = [Path(s).stem for s in options.scenarios]
+    if not stems or not all(stems):
+        raise SettingsError("scenarios: expected names or paths, with commas between them")
+    if len(set(stems)) < len(stems):
+        raise SettingsError(f"scenarios: each once, and names that differ; got {', '.join(stems)}")
+    if options.scheduler:
+        check_cluster()
+
+
+def _claim(out: Path, study: dict[str, Any]) -> None:
+    """Make the folder this study's, or see that it is."""
+    mark = out / "study.json"
+    if mark.is_file():
+        there = json.loads(mark.read_text())
+        for key, value in study.items():
+            if there.get(key) != value:
+                raise FileExistsError(
+                    f"{out} holds a study whose {key} is {there.get(key)!r}, this one's is "
+                    f"{value!r}; choose another --out"
+                )
+        return
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise FileExistsError(f"{out} is there already, and no study; choose another --out")
+    out.mkdir(parents=True, exist_ok=True)
+    if not os.access(out, os.W_OK):
+        raise SettingsError(f"{out}: nothing can be written there")
+    mark.write_text(json.dumps(study, indent=1) + "\n")
+
+
+def _write_table(path: Path, rows: list[Row]) -> None:
+    keys = list(dict.fromkeys(k for r in rows for k in r))
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, keys)
+        writer.writeheader()
+        writer.writerows(rows)

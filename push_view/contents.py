@@ -1,0 +1,178 @@
+"""What a bag holds, as time series: bodies, jobs of all teams, controllers, collisions."""
+
+from collections.abc import Container
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import yaml
+
+from push_model.arrays import Array
+from push_record.bag import read_bag, read_metadata
+from push_ros.validation import InvalidMessage, planar_pose
+from push_scenario.scenario import Scenario, scenario_from_mapping
+from push_view.collisions import Collisions
+
+STATUS = (
+    "time",
+    "error_x",
+    "error_y",
+    "error_theta",
+    "solve_time",
+    "curvature_margin",
+    "obstacle_margin",
+    "object_offset_y",
+)
+"""Columns of a controller's status, see push_msgs/ControllerStatus."""
+
+_SPACING = 0.02  # [s] least, between frames that are kept
+_MOVING = (1, 2)  # modes MOVE and PUSH of ControllerStatus
+_Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+
+@dataclass(frozen=True)
+class State:
+    """Of a job, at a time [s]; code: of the last job that ended."""
+
+    time: float
+    name: str
+    reason: str
+    code: int
+
+
+@dataclass
+class Job:
+    """What a team did. goal ``(3,)``: the last one; plan: ``(n, 2)`` [m] of each push's axle."""
+
+    space: str
+    system: str = ""
+    robots: tuple[str, ...] = ()
+    object: str = ""
+    states: list[State] = field(default_factory=list)
+    goal: Array | None = None
+    plan: list[Array] = field(default_factory=list)
+
+
+@dataclass
+class BagContents:
+    """time ``(n,)`` [s]; poses ``(n, 3)`` by body, ground truth, nan where it is not told.
+
+    status: by robot, by column of STATUS ``(k,)``; jobs: by the team's namespace.
+    """
+
+    scenario: Scenario
+    metadata: dict[str, str]
+    collisions: Collisions
+    time: Array = field(default_factory=lambda: np.zeros(0))
+    poses: dict[str, Array] = field(default_factory=dict)
+    status: dict[str, dict[str, Array]] = field(default_factory=dict)
+    jobs: dict[str, Job] = field(default_factory=dict)
+
+
+class _Suffixes(Container[str]):
+    """Topics by how their names end, whatever the namespace."""
+
+    def __init__(self, *suffixes: str) -> None:
+        self._suffixes = tuple(f"/{s}" for s in suffixes)
+
+    def __contains__(self, topic: object) -> bool:
+        return str(topic).endswith(self._suffixes)
+
+
+def _seconds(stamp: Any) -> float:
+    return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
+
+
+class _Frames:
+    """Frames of poses on their way into arrays."""
+
+    def __init__(self, names: tuple[str, ...]) -> None:
+        self._index = {name: i for i, name in enumerate(names)}
+        self.times: list[float] = []
+        self.frames: list[Array] = []
+        self._last: tuple[float, Array] | None = None
+
+    def take(self, message: Any) -> None:
+        frame = np.full((len(self._index), 3), np.nan)
+        known = [(self._index[n], i) for i, n in enumerate(message.names) if n in self._index]
+        if known:
+            rows, columns = np.array(known).T
+            frame[rows] = np.column_stack([message.x, message.y, message.theta])[columns]
+        time = _seconds(message.header.stamp)
+        self._last = (time, frame)
+        if not self.times or not 0.0 <= time - self.times[-1] < _SPACING - 1e-9:
+            self._keep()
+
+    def finish(self) -> tuple[Array, dict[str, Array]]:
+        """Times and poses by name, the last frame among them."""
+        self._keep()
+        if not self.frames:
+            return np.zeros(0), {}
+        table = np.array(self.frames)
+        seen = {name: table[:, i] for name, i in self._index.items()}
+        return np.array(self.times), {n: p for n, p in seen.items() if np.isfinite(p).any()}
+
+    def _keep(self) -> None:
+        if self._last is not None:
+            self.times.append(self._last[0])
+            self.frames.append(self._last[1])
+            self._last = None
+
+
+def load(bag: Path) -> BagContents:
+    """Read what a report shows.
+
+    Raises
+    ------
+    ValueError: the bag holds no scenario. FileNotFoundError: it is none.
+    """
+    metadata = read_metadata(bag)
+    if "scenario" not in metadata:
+        raise ValueError(f"{bag}: no scenario in it; was it recorded by planar-push?")
+    name = metadata.get("scenario_name", "scenario")
+    values = yaml.load(metadata["scenario"], Loader=_Loader)
+    scenario = scenario_from_mapping(values, name, str(bag))
+    collisions = Collisions(frozenset(scenario.robots), frozenset(scenario.objects))
+    contents = BagContents(scenario, metadata, collisions)
+    frames = _Frames((*scenario.robots, *scenario.objects))
+    status: dict[str, list[list[float]]] = {}
+    wanted = _Suffixes(
+        "ground_truth/poses", "job_state", "push_plan", "contacts", "controller/status"
+    )
+    for record in read_bag(bag, cast(set[str], wanted)):
+        m = record.message
+        if record.topic.endswith("/ground_truth/poses"):
+            frames.take(m)
+        elif record.topic.endswith("/controller/status"):
+            if m.mode in _MOVING:
+                row = [_seconds(m.header.stamp), *(getattr(m, k) for k in STATUS[1:])]
+                status.setdefault(str(m.robot), []).append(row)
+        elif record.topic.endswith("/contacts"):
+            collisions.take(_seconds(m.header.stamp), m.body_a, m.body_b)
+        else:
+            space = record.topic.rpartition("/")[0] + "/"
+            job = contents.jobs.setdefault(space, Job(space))
+            if record.topic.endswith("/job_state"):
+                _take_state(job, m)
+            else:
+                job.plan = [np.column_stack([s.trajectory.x, s.trajectory.y]) for s in m.segments]
+    contents.time, contents.poses = frames.finish()
+    for robot, rows in status.items():
+        table = np.array(rows, dtype=np.float64)
+        contents.status[robot] = dict(zip(STATUS, table.T, strict=True))
+    return contents
+
+
+def _take_state(job: Job, message: Any) -> None:
+    job.system, job.object = str(message.system), str(message.object)
+    job.robots = tuple(str(r) for r in message.robots)
+    stamp = _seconds(message.header.stamp)
+    job.states.append(
+        State(stamp, str(message.state_name), str(message.reason), int(message.error_code))
+    )
+    if message.goal.header.frame_id:
+        try:
+            job.goal = planar_pose(message.goal.pose, "the goal")
+        except InvalidMessage:  # what somebody recorded need not be right
+            pass

@@ -1,0 +1,129 @@
+"""Pictures of a run with matplotlib: the map, bodies, ways, goals; for one body or a thousand."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.patches import Polygon
+
+from push_model import se2
+from push_model.arrays import Array
+from push_model.occupancy import OccupancyGrid
+from push_view.bodies import Bodies, bodies_of
+from push_view.contents import BagContents, Job
+
+PLAN, GOAL, INK = "#777777", "#c22f3d", "#222222"
+
+_NAMED = 6  # bodies that have a name each in the legend
+_WAY_POINTS = 2000  # of all that a way is drawn with
+
+
+def draw_map(axes: Axes, grid: OccupancyGrid) -> None:
+    """Draw the occupancy grid, axes in [m]."""
+    axes.imshow(
+        np.where(grid.occupied, 0.25, 1.0),
+        origin="lower",
+        extent=grid.extent,
+        cmap="gray",
+        vmin=0.0,
+        vmax=1.0,
+        interpolation="nearest",
+    )
+    axes.set_aspect("equal")
+    axes.set_xlabel("x [m]")
+    axes.set_ylabel("y [m]")
+
+
+def draw_body(axes: Axes, outline: Array, pose: Array, color: str, **style: Any) -> Polygon:
+    """An outline ``(n, 2)`` [m] at a pose ``(3,)``."""
+    patch = Polygon(se2.transform(pose, outline), closed=True, edgecolor=color, **style)
+    axes.add_patch(patch)
+    return patch
+
+
+def body_vertices(bodies: Bodies, poses: dict[str, Array], moment: int) -> dict[str, list[Array]]:
+    """World outlines ``(n, 2)`` [m] of the bodies seen at a moment, by colour."""
+    result: dict[str, list[Array]] = {t.color: [] for t in bodies.types}
+    for name, type_of in zip(bodies.names, bodies.type_of, strict=True):
+        if name in poses and np.isfinite(poses[name][moment]).all():
+            kind = bodies.types[type_of]
+            result[kind.color].append(se2.transform(poses[name][moment], kind.outline))
+    return result
+
+
+def draw_bodies(axes: Axes, vertices: dict[str, list[Array]], **style: Any) -> None:
+    """Outlines by colour, filled."""
+    for color, outlines in vertices.items():
+        axes.add_collection(
+            PolyCollection(outlines, facecolors=color, edgecolors=color, **style), autolim=False
+        )
+
+
+def draw_ways(axes: Axes, bodies: Bodies, poses: dict[str, Array]) -> None:
+    """Where all bodies went; each named in the legend when they are few, or else by kind."""
+    few = len(poses) <= _NAMED
+    named: set[str] = set()
+    for kind in bodies.types:
+        members = [n for n, t in zip(bodies.names, bodies.type_of, strict=True) if n in poses]
+        members = [n for n in members if bodies.type(n) is kind]
+        if few:
+            for name in members:
+                axes.plot(*poses[name][:, :2].T, color=kind.color, lw=1.4, label=name)
+            continue
+        step = max(1, len(next(iter(poses.values()))) * len(poses) // (_WAY_POINTS * 100))
+        label = "robots" if kind.robot else "objects"
+        axes.add_collection(
+            LineCollection(
+                [poses[n][::step, :2] for n in members],
+                colors=kind.color,
+                linewidths=0.5,
+                alpha=0.6,
+                label=None if label in named else label,
+            ),
+            autolim=False,
+        )
+        named.add(label)
+
+
+def moments(count: int, bodies: int) -> Array:
+    """Indices of the frames in which bodies are drawn: fewer, the more bodies there are."""
+    if count == 0:
+        return np.zeros(0, dtype=int)
+    snapshots = 7 if bodies <= _NAMED else 2 if bodies <= 50 else 1
+    if snapshots == 1:
+        return np.array([count - 1])
+    return np.unique(np.linspace(0, count - 1, snapshots).astype(int))
+
+
+def draw_jobs(axes: Axes, bodies: Bodies, jobs: Iterable[Job]) -> None:
+    """Plans and goals of some teams."""
+    planned = aimed = False
+    for job in jobs:
+        for way in job.plan:
+            label = None if planned else "plan (axle)"
+            axes.plot(*way.T, color=PLAN, lw=1.0, ls="--", label=label)
+            planned = True
+        if job.goal is not None and job.object in bodies.names:
+            outline = bodies.type(job.object).outline
+            goal = draw_body(axes, outline, job.goal, GOAL, fill=False, lw=1.6)
+            goal.set_label("_" if aimed else "goal")
+            aimed = True
+
+
+def draw_trajectory(axes: Axes, contents: BagContents, jobs: Iterable[Job] | None = None) -> None:
+    """Map, plans and goals of some teams or all, ways of all bodies, and them at some moments."""
+    bodies = bodies_of(contents.scenario)
+    draw_map(axes, contents.scenario.grid)
+    draw_jobs(axes, bodies, contents.jobs.values() if jobs is None else jobs)
+    draw_ways(axes, bodies, contents.poses)
+    alpha = 0.35 if len(contents.poses) <= _NAMED else 0.6
+    for moment in moments(len(contents.time), len(contents.poses)):
+        vertices = body_vertices(bodies, contents.poses, int(moment))
+        draw_bodies(axes, vertices, alpha=alpha, linewidths=0.8)
+    x0, x1, y0, y1 = contents.scenario.grid.extent
+    axes.set_xlim(x0, x1)
+    axes.set_ylim(y0, y1)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(loc="upper left", fontsize=7, framealpha=0.9)

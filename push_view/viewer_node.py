@@ -1,0 +1,216 @@
+"""The viewer's side in ROS: what pages are shown, and the goals that they send.
+
+A node like any other: it sees poses, map, plans and jobs of all teams in its world's namespace,
+sends goals, and knows neither the bridge nor the ground truth. Which bodies there are it learns
+from the latched topic ``scenario``.
+"""
+
+import queue
+import threading
+import time
+from collections.abc import Callable
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+import yaml
+from nav_msgs.msg import OccupancyGrid as GridMessage
+from PIL import Image
+from rclpy._rclpy_pybind11 import RCLError
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.serialization import deserialize_message
+from std_msgs.msg import Bool, String
+
+from push_model.occupancy import OccupancyGrid
+from push_model.settings import SettingsError
+from push_msgs.msg import Poses
+from push_ros.conversions import grid_from_ros
+from push_ros.names import Names, names_of
+from push_ros.qos import LATCHED, STREAM
+from push_ros.validation import InvalidMessage
+from push_scenario.scenario import Scenario, scenario_from_mapping
+from push_view.bodies import bodies_of
+from push_view.event_board import EventBoard
+from push_view.pose_table import PoseTable
+from push_view.suite_watch import SuiteWatch
+from push_view.team_spaces import team_spaces
+from push_view.team_view import TeamView, stamp_text
+
+PERIOD = 0.05
+"""[s] between two frames that pages are shown."""
+_LOOK = 0.25  # [s] between two looks at the graph
+_SEARCH = 1.0  # [s] between two searches for teams
+_Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+
+class NotTaken(Exception):
+    """A goal or a cancel that is not passed on; the text says why."""
+
+
+class ViewerNode(Node):
+    """Keeps ``board`` up to date. Methods without an underscore may be called from any thread."""
+
+    def __init__(self, scenario: Scenario | None = None) -> None:
+        """scenario: known beforehand; one on the topic replaces it."""
+        super().__init__("viewer")
+        self.names = names_of(self)
+        self.board = EventBoard()
+        self._lock = threading.Lock()
+        self._requests: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._teams: dict[str, TeamView] = {}
+        self._grid: OccupancyGrid | None = None
+        self._maps = 0
+        self._table: PoseTable | None = None
+        self._revision = 0
+        self._frame: bytes | None = None
+        self._last_stamp = 0
+        self._watch = SuiteWatch(self.names.world("poses"), time.monotonic())
+        if scenario is not None:
+            self._show(scenario)
+        world = self.names.world
+        self.create_subscription(Poses, world("poses"), self._on_poses, STREAM, raw=True)
+        self.create_subscription(GridMessage, world("map"), self._on_map, LATCHED)
+        self.create_subscription(String, world("scenario"), self._on_scenario, LATCHED)
+        self.create_subscription(Bool, world("paused"), self._on_paused, LATCHED)
+        wall = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(PERIOD, self._work, clock=wall)
+        self.create_timer(_LOOK, self._look, clock=wall)
+        self.create_timer(_SEARCH, self._search, clock=wall)
+        self._search()
+
+    def suite(self) -> dict[str, Any]:
+        """What is wrong with the suite, in a sentence or empty; the same of each team."""
+        trouble = self._watch.trouble(time.monotonic())
+        with self._lock:
+            teams = list(self._teams.values())
+        return {
+            "trouble": trouble,
+            "paused": self._watch.paused,
+            "teams": {t.space: trouble or self._deaf(t) for t in teams},
+        }
+
+    def map_image(self) -> bytes | None:
+        """The map as a PNG, the first row on top; None while there is none."""
+        with self._lock:
+            grid = self._grid
+        if grid is None:
+            return None
+        data = BytesIO()
+        pixels = np.where(grid.occupied[::-1], 60, 255).astype(np.uint8)
+        Image.fromarray(pixels).save(data, "png")
+        return data.getvalue()
+
+    def send_goal(self, space: str, x: float, y: float, theta: float) -> str:
+        """Ask a team for a goal pose [m, m, rad].
+
+        The goal is stamped with wall time, no two alike; returned is the stamp, by which
+        JobState.goal or JobState.refused_goal tells what became of it. space: of the team; empty:
+        the first. Raises NotTaken where nobody would take it.
+        """
+        team = self._ready(space)
+        with self._lock:
+            self._last_stamp = max(time.time_ns(), self._last_stamp + 1)
+            message = team.goal_message(np.array([x, y, theta]), self._last_stamp)
+        self._requests.put(lambda: team.send(message))
+        return stamp_text(message)
+
+    def cancel(self, space: str) -> None:
+        """Ask a team to cancel its job. Raises NotTaken where nobody would hear it."""
+        self._requests.put(self._ready(space).cancel)
+
+    def _ready(self, space: str) -> TeamView:
+        with self._lock:
+            team = self._teams.get(space) if space else next(iter(self._teams.values()), None)
+        trouble = self._watch.trouble(time.monotonic())
+        if trouble:
+            raise NotTaken(trouble)
+        if team is None:
+            raise NotTaken(f"there is no team in '{space}'" if space else "there is no team yet")
+        if not team.hears:
+            raise NotTaken(self._deaf(team))
+        return team
+
+    @staticmethod
+    def _deaf(team: TeamView) -> str:
+        return "" if team.hears else f"nobody takes goals on {team.names.team('goal_pose')}"
+
+    def _show(self, scenario: Scenario) -> None:
+        self._revision += 1
+        self._table = PoseTable(bodies_of(scenario))
+        self._frame = None
+        self.board.drop("poses")
+        data = {"revision": self._revision, **self._table.bodies.as_json()}
+        self.board.put("bodies", "bodies", data)
+
+    def _on_scenario(self, message: String) -> None:
+        where = self.names.world("scenario")
+        try:
+            values = yaml.load(message.data, Loader=_Loader)
+            scenario = scenario_from_mapping(values, "scenario", where)
+        except (yaml.YAMLError, SettingsError) as error:
+            self.get_logger().warning(f"refused a scenario: {error}")
+            return
+        self._show(scenario)
+        for space, team in list(self._teams.items()):  # those of the scenario before
+            if self.count_publishers(team.names.team("job_state")) == 0:
+                team.close()
+                with self._lock:
+                    del self._teams[space]
+        self._list_teams()
+
+    def _on_poses(self, data: bytes) -> None:
+        self._watch.poses_came(time.monotonic())
+        self._frame = data  # read by _work, not more often than pages are shown it
+
+    def _on_paused(self, message: Bool) -> None:
+        self._watch.paused = bool(message.data)
+
+    def _on_map(self, message: GridMessage) -> None:
+        try:
+            grid = grid_from_ros(message)
+        except InvalidMessage as error:
+            self.get_logger().warning(f"refused a map: {error}")
+            return
+        with self._lock:
+            self._grid = grid
+        self._maps += 1
+        self.board.put("map", "map", {"number": self._maps, "extent": [*map(float, grid.extent)]})
+
+    def _work(self) -> None:
+        """Carry out what pages asked for; show the newest frame."""
+        while not self._requests.empty():
+            self._requests.get()()
+        data, self._frame = self._frame, None
+        if data is None or self._table is None:
+            return
+        try:
+            self._table.take(deserialize_message(data, Poses))
+        except (RuntimeError, RCLError, ValueError) as error:
+            self.get_logger().warning(
+                f"refused a frame of poses: {error}", throttle_duration_sec=5.0
+            )
+            return
+        self.board.put("poses", "poses", {"revision": self._revision, **self._table.as_json()})
+
+    def _look(self) -> None:
+        """See in the graph who is there."""
+        self._watch.looked(time.monotonic(), self.count_publishers(self.names.world("poses")))
+        for team in self._teams.values():
+            team.look()
+            team.show_panel()
+
+    def _search(self) -> None:
+        """See in the graph which teams there are."""
+        topics = self.get_topic_names_and_types()
+        found = team_spaces(topics, self.names.world_space, self.names.team_space)
+        new = [space for space in found if space not in self._teams]
+        for space in new:
+            team = TeamView(self, Names(self.names.world_space, space), self.board)
+            with self._lock:
+                self._teams[space] = team
+        if new:
+            self._list_teams()
+
+    def _list_teams(self) -> None:
+        self.board.put("teams", "teams", {"spaces": list(self._teams)})

@@ -1,0 +1,89 @@
+"""Which requests the page's server answers: those of its own page, and of nobody else's.
+
+The rule. Any web page may send requests to this server from the browser of whoever looks at it, and
+may have its own name lead here (DNS rebinding). So a request must name, as its Host, an address
+under which the server is really reached, and must not come from another origin:
+
+- ``localhost``, the host that the server was told to bind, and addresses written as numbers
+  (``127.0.0.1``, ``192.168.1.7``, ``[::1]``) are taken: a name of somebody else's cannot be one.
+  Bound to one address, the only numbers are its own and those of the loopback.
+- Bound to all addresses (``0.0.0.0``, ``::``), every address in numbers is taken, and the machine's
+  own host name. No other name is.
+- The port is not looked at: a tunnel may lead here from another one.
+- ``Origin``, where a browser sends it, must be that host and port; ``Sec-Fetch-Site`` must not tell
+  of another site, except for the page itself, which anybody may link to.
+- What moves a robot must also be announced as JSON, which other sites cannot do unasked.
+"""
+
+import ipaddress
+import socket
+from collections.abc import Sequence
+from dataclasses import dataclass
+from email.message import Message
+
+_LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
+
+
+def host_name(text: str) -> str:
+    """The host in a Host header, in lower case, without port and brackets; empty for nonsense."""
+    text = text.strip().lower()
+    if text.startswith("["):
+        name, bracket, rest = text[1:].partition("]")
+        good = bracket and (not rest or (rest[0] == ":" and rest[1:].isdigit()))
+    else:
+        name, colon, port = text.partition(":")
+        good = not colon or port.isdigit()
+    return name.rstrip(".") if good else ""
+
+
+def _is_address(name: str) -> bool:
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+@dataclass(frozen=True)
+class WhoMayAsk:
+    """The rule for a server bound to a host; own_name: of the machine."""
+
+    bound: str
+    own_name: str
+
+    @property
+    def everywhere(self) -> bool:
+        """Whether it is bound to all addresses."""
+        return self.bound in ("", "0.0.0.0", "::")
+
+    def knows(self, host: str) -> bool:
+        """Whether a Host header names an address under which the server is reached."""
+        name = host_name(host)
+        if not name:
+            return False
+        if self.everywhere:
+            return name in (*_LOOPBACK, self.own_name.lower()) or _is_address(name)
+        return name in (*_LOOPBACK, self.bound.lower().strip("[]"))
+
+    def refusal(self, headers: Message, *, page: bool = False, acts: bool = False) -> str:
+        """Why a request is not answered; empty when it is.
+
+        page: it asks for the page itself. acts: it would move something.
+        """
+        hosts: Sequence[str] = headers.get_all("Host") or []
+        if len(hosts) != 1 or not self.knows(hosts[0]):
+            return f"this server does not go by the name {' and '.join(hosts) or '(none)'}"
+        origins = headers.get_all("Origin") or []
+        if any(origin.lower() != f"http://{hosts[0].lower()}" for origin in origins):
+            return "only from the page itself, not from another site's"
+        site = headers.get("Sec-Fetch-Site", "same-origin")
+        if not page and site not in ("same-origin", "none"):
+            return "only from the page itself, not from another site's"
+        if acts and headers.get("Content-Type") != "application/json":
+            return "only from the page itself: expected Content-Type application/json"
+        return ""
+
+
+def who_may_ask(bound: str) -> WhoMayAsk:
+    """The rule for a server that this machine binds to a host."""
+    return WhoMayAsk(bound, socket.gethostname())

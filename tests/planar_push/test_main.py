@@ -1,0 +1,143 @@
+"""The command line: its grammar, and that what is wrong is said before anything starts."""
+
+import importlib
+import json
+
+import numpy as np
+import pytest
+import rclpy
+
+from planar_push import words
+from planar_push.main import main, parser, verbs
+from push_bringup import launcher
+from push_msgs.msg import Poses
+from push_ros.conversions import poses_to_ros
+from push_ros.qos import STREAM
+from push_scenario.scenario import config_directory
+
+
+@pytest.fixture
+def nothing_starts(monkeypatch):
+    """No process is started."""
+
+    def refuse(*_, **__):
+        raise AssertionError("a process was started")
+
+    monkeypatch.setattr(launcher.subprocess, "Popen", refuse)
+
+
+def code_of(line):
+    try:
+        return main(line)
+    except SystemExit as refusal:  # by the grammar
+        return refusal.code
+
+
+def test_every_verb_has_words_and_says_what_it_does():
+    assert {"demo", "launch", "goal", "view", "record", "play", "report", "experiment"} <= set(
+        verbs()
+    )
+    text = parser().format_help()
+    for name in verbs():
+        verb = importlib.import_module(f"planar_push.{name}")
+        assert verb.__doc__ and name.replace("_", "-") in text
+        with pytest.raises(SystemExit) as refusal:
+            main([name.replace("_", "-"), "--help"])
+        assert refusal.value.code == 0
+
+
+@pytest.mark.parametrize(
+    ("line", "what"),
+    [
+        (["launch", "single", "--scenario", "atlantis"], "env1-target1"),
+        (["launch", "single", "--factor", "0"], "positive"),
+        (["launch", "single", "--factor", "nan"], "finite"),
+        (["launch", "single", "--factor", "inf"], "finite"),
+        (["launch", "single", "--factor", "-1"], "positive"),
+        (["launch", "single", "--factor", "1e9"], "real_time_factor"),
+        (["launch", "single", "--namespace", "1a"], "namespace"),
+        (["launch", "orchestra"], "single"),
+        (["launch", "single", "--record", "BAG"], "is there already"),
+        (["launch", "single", "--record", "FILE/bag"], "cannot be written"),
+        (["launch", "single", "--scenario", "ring20"], "robots"),
+        (["demo", "--scenario", "atlantis", "--out", "OUT"], "env1-target1"),
+        (["demo", "--factor", "0", "--out", "OUT"], "positive"),
+        (["demo", "--namespace", "a b", "--out", "OUT"], "namespace"),
+        (["demo", "--timeout", "0", "--out", "OUT"], "positive"),
+        (["demo", "--out", "FILE/demo"], "cannot be written"),
+        (["record", "--out", "BAG"], "is there already"),
+        (["record", "--scenario", "atlantis", "--out", "OUT"], "env1-target1"),
+        (["record", "--namespace", "a-b", "--out", "OUT"], "namespace"),
+        (["view", "--scenario", "atlantis"], "env1-target1"),
+        (["view", "--port", "-1"], "at least 0"),
+        (["goal", "nan", "0", "0"], "finite"),
+        (["goal", "0", "0", "0", "--namespace", "/a b"], "namespace"),
+        (["report", "NOWHERE"], "NOWHERE"),
+        (["play", "NOWHERE"], "NOWHERE"),
+        (["play", "BAG", "--factor", "0"], "positive"),
+        (["recover", "NOWHERE", "--out", "OUT"], "NOWHERE"),
+    ],
+)
+def test_wrong_words_end_with_2_before_anything_starts(
+    tmp_path, capsys, nothing_starts, line, what
+):
+    (tmp_path / "BAG").mkdir()
+    (tmp_path / "FILE").write_text("")
+    places = ("BAG", "FILE", "OUT", "NOWHERE")
+    line = [str(tmp_path / w) if w.split("/")[0] in places else w for w in line]
+    before = sorted(tmp_path.rglob("*"))
+    assert code_of(line) == 2
+    error = capsys.readouterr().err
+    assert what in error and "Traceback" not in error
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_demo_that_cannot_start_leaves_the_last_one_alone(tmp_path, capsys, nothing_starts):
+    (tmp_path / "report.pdf").write_text("of the last demo")
+    assert main(["demo", "--scenario", "ring20", "--out", str(tmp_path)]) == 2
+    assert (tmp_path / "report.pdf").read_text() == "of the last demo"
+
+
+@pytest.mark.parametrize("namespace", ["", "a"])
+def test_a_second_suite_in_a_domain_is_noticed(tmp_path, ros, domain, capsys, namespace):
+    """FAULTS 23: before anything starts; a namespace is room for another one."""
+    node = rclpy.create_node("somebody", namespace=namespace)
+    publisher = node.create_publisher(Poses, "poses", STREAM)
+    publisher.publish(poses_to_ros({"box": np.zeros(3)}, 0.0))
+    own = ["--namespace", namespace] if namespace else []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(launcher.subprocess, "Popen", None)
+        for line in (
+            ["launch", "single", *own],
+            ["demo", "--scenario", "short", "--out", str(tmp_path / "demo"), *own],
+        ):
+            assert main(line) == 2
+            error = capsys.readouterr().err
+            assert f"a bridge already runs in domain {domain}" in error
+        assert not (tmp_path / "demo").exists()
+        with pytest.raises(TypeError):  # it would start there
+            main(["launch", "single", "--namespace", "elsewhere"])
+    node.destroy_node()
+
+
+@pytest.mark.parametrize("verb", ["view", "record"])
+def test_without_a_bridge_it_is_said_what_is_missing(tmp_path, capsys, monkeypatch, verb):
+    monkeypatch.setattr("push_record.recorder._PATIENCE", 0.3)
+    extra = ["--out", str(tmp_path / "bag")] if verb == "record" else []
+    assert main([verb, "--namespace", "lab", *extra]) == 2
+    assert "/lab/scenario" in capsys.readouterr().err
+    assert not (tmp_path / "bag").exists()
+
+
+def test_schemas_are_written_as_they_are_in_config(tmp_path, capsys):
+    assert main(["schema", "--out", str(tmp_path)]) == 0
+    made = {p.name: json.loads(p.read_text()) for p in tmp_path.glob("*.json")}
+    kept = {p.name: json.loads(p.read_text()) for p in (config_directory() / "schema").glob("*")}
+    assert made and made == kept
+
+
+def test_numbers_on_the_command_line():
+    assert words.positive("2.5") == 2.5 and words.whole(1)("3") == 3
+    for parse, text in ((words.positive, "0"), (words.finite, "nan"), (words.whole(1), "0")):
+        with pytest.raises(words.argparse.ArgumentTypeError):
+            parse(text)

@@ -1,0 +1,150 @@
+"""Who makes up a system: names, namespaces, command lines, what is refused."""
+
+import numpy as np
+import pytest
+import yaml
+
+from push_bringup.node_settings import SECTIONS, changed, check_settings, defaults
+from push_bringup.preparation import check_bag, prepare
+from push_bringup.systems import LIVE, MODULES, nodes_of, single, teams_of
+from push_model.settings import SettingsError
+from push_scenario.scenario import load_scenario, scenario_from_text
+
+
+def parameters(words):
+    """ROS parameters of a command line."""
+    values = [w for f, w in zip(words, words[1:], strict=False) if f == "-p"]
+    return {k: yaml.safe_load(v) for k, v in (w.split(":=", 1) for w in values)}
+
+
+def test_one_robot_without_teams():
+    nodes = single(load_scenario("short"))
+    assert [(n.name, n.namespace) for n in nodes] == [
+        ("bridge", "/"),
+        ("controller", "/epuck1"),
+        ("planner", "/"),
+        ("supervisor", "/"),
+    ]
+    assert {n.kind for n in nodes} < set(MODULES)
+    words = nodes[-1].words("short")
+    assert words[:3] == ["--ros-args", "-r", "__ns:=/"]
+    expected = {"scenario": "short", "world": "/", "robot": "epuck1", "object": "box"}
+    assert parameters(words) == expected
+
+
+@pytest.mark.parametrize("namespace", ["", "a", "/a/", "/lab/a"])
+def test_teams_have_planner_and_supervisor_and_robots_their_controllers(namespace):
+    nodes = single(load_scenario("two-singles"), namespace)
+    root = "/" + namespace.strip("/") if namespace else ""
+    places = {n.name: n.namespace for n in nodes}
+    assert places == {
+        "bridge": root or "/",
+        "south/controller": f"{root}/epuck1",
+        "south/planner": f"{root}/south",
+        "south/supervisor": f"{root}/south",
+        "north/controller": f"{root}/epuck2",
+        "north/planner": f"{root}/north",
+        "north/supervisor": f"{root}/north",
+    }
+    assert {n.world for n in nodes} == {root or "/"}
+    assert {(n.team, n.robot, n.item) for n in nodes if n.kind == "supervisor"} == {
+        ("south", "epuck1", "box1"),
+        ("north", "epuck2", "box2"),
+    }
+
+
+@pytest.mark.parametrize("namespace", ["1a", "a b", "a//b", "ä", "a/-"])
+def test_a_namespace_that_ros_would_refuse(namespace):
+    with pytest.raises(SettingsError, match="namespace"):
+        nodes_of("single", load_scenario("short"), namespace)
+
+
+def test_an_unknown_system_and_a_team_too_large():
+    with pytest.raises(SettingsError, match=r"'quartet'.*single"):
+        nodes_of("quartet", load_scenario("short"))
+    scenario = load_scenario("two-singles")
+    text = yaml.safe_load(scenario.text)
+    del text["teams"]["north"]
+    text["teams"]["south"]["robots"] = ["epuck1", "epuck2"]
+    both = scenario_from_text(yaml.safe_dump(text), "both", "both")
+    with pytest.raises(SettingsError, match="'south' has 2 robots"):
+        single(both)
+
+
+def test_parameters_given_in_code_replace_the_scenarios_and_are_checked():
+    made = prepare("short", parameters={"planner": {"push_speed": 0.05}}).scenario
+    assert made.parameters["planner"] == {"push_speed": 0.05}
+    deep = {"bridge": {"motion_capture": {"latency": 0.02}}, "controller": {"mpc": {"horizon": 12}}}
+    made = prepare("short", parameters=deep).scenario
+    assert made.parameters["bridge"]["motion_capture"] == {"latency": 0.02}
+    assert made.parameters["controller"]["mpc"] == {"horizon": 12}
+    for wrong, word in (
+        ({"planner": {"push_speed": -1.0}}, "push_speed"),
+        ({"planner": {"push_sped": 1.0}}, "push_sped"),
+        ({"controller": {"tracker": {"deadline": "soon"}}}, "deadline"),
+        ({"controller": {"horizon": 3}}, "horizon"),
+        ({"bridge": {"physics": {"weather": 1}}}, "weather"),
+        ({"plumber": {}}, "plumber"),
+        ({"planner": 3}, "planner"),
+    ):
+        with pytest.raises(SettingsError, match=word):
+            prepare("short", parameters=wrong)
+
+
+def test_the_live_deadline_yields_to_the_scenario_and_lockstep_has_none():
+    deadline = LIVE["controller"]["tracker"]["deadline"]
+    made = prepare("short").scenario.parameters["controller"]["tracker"]
+    assert made == {"deadline": deadline}
+    own = {"controller": {"tracker": {"deadline": 0.2}}}
+    made = prepare("short", parameters=own).scenario.parameters["controller"]["tracker"]
+    assert made == {"deadline": 0.2}
+    assert "controller" not in load_scenario("short").parameters
+
+
+def test_a_factor_overrides_the_scenario_only_when_it_is_given():
+    scenario = load_scenario("short").settings("bridge", real_time_factor=2.0)
+    assert prepare(scenario).scenario.parameters["bridge"]["real_time_factor"] == 2.0
+    assert prepare(scenario, factor=4).scenario.parameters["bridge"]["real_time_factor"] == 4.0
+    assert "bridge" not in prepare("short").scenario.parameters
+    with pytest.raises(SettingsError, match="real_time_factor"):
+        prepare("short", factor=-1.0)
+
+
+def test_what_the_processes_read_is_what_was_checked(tmp_path):
+    setup = prepare(
+        "two-singles", parameters={"planner": {"push_speed": 0.05}}, record=tmp_path / "bag"
+    )
+    (tmp_path / "s").mkdir()
+    children = setup.write(tmp_path / "s")
+    assert children[0].name == "recorder" and children[0].bag == tmp_path / "bag"
+    assert len({c.name for c in children}) == len(children) == 8
+    for child in children:
+        read = load_scenario(parameters(child.words)["scenario"])
+        assert read.name == "two-singles" and read.parameters == setup.scenario.parameters
+        assert [t.name for t in teams_of(read)] == ["south", "north"]
+        for name, (spec, start) in setup.scenario.robots.items():
+            assert read.robots[name][0] == spec and np.array_equal(read.robots[name][1], start)
+    children[0].deaths = 2
+    assert parameters(children[0].words)["out"] == f"{tmp_path}/bag-3"
+
+
+def test_a_bag_that_cannot_be_written_is_refused(tmp_path):
+    check_bag(tmp_path / "new" / "bag")
+    (tmp_path / "bag").mkdir()
+    with pytest.raises(FileExistsError, match="bag is there already"):
+        prepare("short", record=tmp_path / "bag")
+    (tmp_path / "file").write_text("")
+    with pytest.raises(SettingsError, match="cannot be written"):
+        check_bag(tmp_path / "file" / "bag")
+
+
+def test_defaults_are_complete_and_pass_their_own_check():
+    scenario = load_scenario("short")
+    full = changed(scenario, defaults())
+    check_settings(full)
+    assert set(full.parameters) == set(SECTIONS)
+    # what a scenario says stays where only gaps are filled
+    own = scenario.settings("planner", push_speed=0.05)
+    filled = changed(own, defaults(), only_missing=True)
+    assert filled.parameters["planner"]["push_speed"] == 0.05
+    assert filled.parameters["bridge"] == full.parameters["bridge"]

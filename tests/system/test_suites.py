@@ -1,0 +1,159 @@
+"""Suites from Python, two of them side by side, and the examples; all live."""
+
+import contextlib
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import rclpy
+from rclpy.signals import SignalHandlerOptions
+
+from push_bringup.failures import DomainInUse, SuiteFailed
+from push_bringup.launcher import Launcher
+from push_bringup.suite import Suite
+from push_model.jobs import JobError
+from push_record.bag import read_bag
+from push_record.contents import load_contents
+
+pytestmark = pytest.mark.live
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def topics_outside(bag, namespace):
+    """Topics of a bag that are not in a namespace."""
+    return {r.topic for r in read_bag(bag) if not r.topic.startswith(f"/{namespace}/")}
+
+
+def strangers_touched(contents, bag):
+    """Pairs of bodies of different teams, and of a body and a wall, that touched."""
+    teams = {}
+    for name, team in contents.teams.items():
+        for body in (*team.team.robots, team.team.object):
+            teams[body] = name
+    namespace = contents.metadata["namespace"]
+    found = set()
+    for record in read_bag(bag, {f"{namespace}contacts"}):
+        m = record.message
+        for a, b in zip(m.body_a, m.body_b, strict=True):
+            if {a, b} & teams.keys() and teams.get(a) != teams.get(b):
+                found.add((a, b))
+    return found
+
+
+def test_a_script_starts_a_suite_and_is_told_how_it_ended(domain, tmp_path, capfd):
+    events = []
+    parameters = {"planner": {"push_speed": 0.06}, "bridge": {"real_time_factor": 3.0}}
+    with Suite(
+        "short", parameters=parameters, record=tmp_path / "bag", on_event=events.append
+    ) as suite:
+        result = suite.reach(0.1, 0.04, 0.1)
+        refused = suite.reach(50.0, 0.0, 0.0)
+        with pytest.raises(DomainInUse, match=f"domain {domain}"), Suite("short"):
+            pass
+    assert result.success and result.position_error < 0.02 and result.orientation_error < 0.1
+    assert result.code is JobError.NONE and result.duration > 5.0 and result.reason
+    assert result.bag == tmp_path / "bag"
+    assert refused.refused and refused.code is JobError.OUTSIDE_MAP and not refused.success
+    names = [e.state for e in events if e.kind == "state"]
+    assert [n for n, before in zip(names, ["", *names], strict=False) if n != before][:5] == [
+        "planning",
+        "positioning",
+        "approach",
+        "pushing",
+        "detaching",
+    ]
+    contents = load_contents(result.bag)
+    assert contents.final_error()[0] < 0.02
+    assert contents.scenario.parameters["planner"] == {"push_speed": 0.06}
+    out, err = capfd.readouterr()
+    assert out == "" and err == ""  # silent unless asked
+
+
+def test_a_suite_in_a_given_context_ends_with_a_dead_node(domain):
+    context = rclpy.Context()
+    rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        with Suite("short", context=context, factor=3.0) as suite:
+            (child,) = [c for c in suite._launcher.children if c.name == "controller"]
+            child.process.kill()
+            with pytest.raises(SuiteFailed, match=r"controller died \(signal 9\)"):
+                suite.reach(0.1, 0.04, 0.1)
+            launcher = suite._launcher
+        assert all(c.process is None or c.process.poll() is not None for c in launcher.children)
+        assert context.ok()  # it is not the suite's to shut down
+    finally:
+        rclpy.try_shutdown(context=context)
+
+
+def test_what_a_dead_node_said_is_quoted(domain, monkeypatch):
+    suite = Suite("short")
+    write = type(suite.setup).write
+
+    def spoiled(self, folder):
+        children = write(self, folder)
+        children[0].arguments += ["-p", "real_time_factor:=-1.0"]
+        return children
+
+    monkeypatch.setattr(type(suite.setup), "write", spoiled)
+    with pytest.raises(SuiteFailed, match="real_time_factor"), suite:
+        pass
+
+
+def test_two_teams_side_by_side_in_one_world(domain, tmp_path):
+    """Done-when 3: two single-robot systems in one graph, neither touches the other."""
+    with Suite("two-singles", record=tmp_path / "bag", namespace="a", factor=2.0) as suite:
+        results = suite.reach_all()
+    assert set(results) == {"south", "north"}
+    for result in results.values():
+        assert result.success and result.position_error < 0.02, result
+    contents = load_contents(tmp_path / "bag")
+    assert not topics_outside(tmp_path / "bag", "a")
+    assert not strangers_touched(contents, tmp_path / "bag")
+    for name, result in results.items():
+        assert contents.final_error(name)[0] < 0.02
+        states = [s for _, s, _ in contents.team(name).states]
+        assert "PUSHING" in states and result.replans == 0
+
+
+def test_two_suites_in_two_namespaces_of_one_domain(domain, tmp_path):
+    """Two bridges, two of everything: each hears its own."""
+    with contextlib.ExitStack() as stack:
+        bags = {n: tmp_path / n for n in ("a", "b")}
+        suites = {
+            n: stack.enter_context(Suite("short", namespace=n, record=bags[n], factor=1.5))
+            for n in bags
+        }
+        suites["a"].monitor().send_goal((0.1, 0.04, 0.1))
+        suites["b"].monitor().send_goal((0.05, -0.04, -0.1))
+        results = {n: s.monitor().follow(120.0) for n, s in suites.items()}
+        with pytest.raises(DomainInUse, match="in namespace b"):
+            stack.enter_context(Suite("short", namespace="b"))
+    goals = {n: r.goal for n, r in results.items()}
+    assert goals == {"a": (0.1, 0.04, 0.1), "b": (0.05, -0.04, -0.1)}
+    for name, result in results.items():
+        assert result.success and result.position_error < 0.02, result
+        assert not topics_outside(bags[name], name)
+        assert load_contents(bags[name]).final_error()[0] < 0.02
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["reach_a_goal.py", "3"],
+        ["reach_a_goal_in_lockstep.py"],
+        ["two_teams_recorded.py", "2"],
+    ],
+)
+def test_examples(domain, words):
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "examples" / words[0]), *words[1:]],
+        cwd=ROOT,
+        env=Launcher([])._environment | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "NONE: the goal is reached" in done.stdout
