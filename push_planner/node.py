@@ -15,6 +15,7 @@ from rclpy.node import Node
 from push_model.arrays import Array
 from push_model.occupancy import OccupancyGrid as Grid
 from push_model.settings import SettingsError
+from push_model.traction import too_heavy
 from push_msgs.action import PlanPush
 from push_msgs.msg import PushPlan as PlanMessage
 from push_msgs.srv import PlanRobotPath
@@ -47,6 +48,10 @@ from push_scenario.scenario import Scenario, load_scenario
 
 _SIGN_OF_LIFE = 0.5  # [s] wall time between feedback messages at most
 _MAP_PATIENCE = 5.0  # [s] wall time that a request waits for the first map
+
+
+class _TooHeavy(Exception):
+    """The robot cannot push the object; the text says what it needs and what there is."""
 
 
 class PlannerNode(Node):
@@ -179,6 +184,8 @@ class PlannerNode(Node):
             goal = planar_pose(request.goal.pose, "the goal")
             self._work = self._plan(request, start, goal)
             self._continue()
+        except _TooHeavy as error:
+            self._fail(PlanPush.Result.TOO_HEAVY, str(error))
         except InvalidMessage as error:
             self._fail(PlanPush.Result.INVALID_GOAL, str(error))
         except SettingsError as error:
@@ -187,6 +194,9 @@ class PlannerNode(Node):
     def _plan(self, request: Any, start: Array, goal: Array) -> Iterator[Progress]:
         """The work on a request, in slices; raises InvalidMessage and SettingsError."""
         planner = self._planner(request.robot, request.object)
+        problem = too_heavy(planner.scene.robot, planner.scene.item)
+        if problem is not None:
+            raise _TooHeavy(problem)
         circles = circles_from_ros(request.obstacles)
         if len(circles):
             if circles[:, 2].min() < 0.0:

@@ -192,6 +192,7 @@ class SupervisorNode(Node):
 
     def _on_watchdog(self) -> None:
         """Wall time, for when no frames come."""
+        self._advance()
         if self._poses.silence > 0.3:
             self._tend()
 
@@ -257,12 +258,16 @@ class SupervisorNode(Node):
         self._errands.begin(Errand(command, arguments, delay), self._now())
         self._tend()
 
-    def _now(self) -> Moment:
-        """The clocks and who is there."""
+    def _advance(self) -> None:
+        """Move the wall clock on, but for a pause of the world."""
         now = time.monotonic()
         if not self._poses.paused:
             self._wall += now - self._looked
         self._looked = now
+
+    def _now(self) -> Moment:
+        """The clocks and who is there."""
+        self._advance()
         known = self._pose(self.robot) is not None and self._pose(self.object) is not None
         return Moment(self._wall, self._poses.stamp, known, self._peers.ready)
 

@@ -14,6 +14,7 @@ from push_model.jobs import GoalRefused, JobError
 from push_model.occupancy import OccupancyGrid
 from push_model.push_segment import PushSegment
 from push_model.specs import ObjectSpec, RobotSpec
+from push_model.traction import too_heavy
 from push_model.trajectory import Trajectory
 from push_supervisor import motions
 from push_supervisor.footprint import gap, overlaps
@@ -38,6 +39,7 @@ class Surroundings:
         settings: SupervisorSettings,
     ) -> None:
         self.robot, self.item, self.others = robot, item, dict(others)
+        self._too_heavy = too_heavy(robot, item)
         self.grid: OccupancyGrid | None = None
         self.walls = _NONE
         self._outline, self._item_outline = robot.outline, item.outline
@@ -61,7 +63,12 @@ class Surroundings:
         self.walls = motions.wall_circles(grid, self.robot.body_radius, margin)
 
     def check_goal(self, goal: Array) -> None:
-        """Raise GoalRefused where the object cannot stand; without a map all is allowed."""
+        """Raise GoalRefused where the object cannot be brought, as far as is known without a plan.
+
+        Without a map it may stand anywhere.
+        """
+        if self._too_heavy is not None:
+            raise GoalRefused(JobError.TOO_HEAVY, self._too_heavy)
         if self.grid is None:
             return
         where = f"({goal[0]:.2f}, {goal[1]:.2f}, {goal[2]:.2f})"

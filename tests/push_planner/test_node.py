@@ -1,5 +1,7 @@
 """The planner node: modes, bodies, maps that change, and requests that replace each other."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import rclpy
@@ -121,6 +123,18 @@ def test_a_new_map_drops_a_plan_under_way_and_begins_it_anew(client):
     assert client.spinner.until(lambda: client.planner._work is not None, 10.0)
     client.map(rasterise(WALL))
     assert client.result(handle).error_code == R.GOAL_OCCUPIED
+
+
+def test_what_is_too_heavy_is_not_planned(ros):
+    scenario = load_scenario("short")
+    spec, place = scenario.objects["box"]
+    client = Client(replace(scenario, objects={"box": (replace(spec, mass=0.3), place)}))
+    try:
+        result = client.result(client.send())
+        assert result.error_code == R.TOO_HEAVY and "needs" in result.error_msg
+        assert not client.plans and not client.stages
+    finally:
+        client.spinner.close()
 
 
 def test_a_flood_of_requests_leaves_the_last_one_and_one_chain_of_slices(client):

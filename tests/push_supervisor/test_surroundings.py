@@ -1,5 +1,8 @@
 """Goals at the door, motions beside walls, other bodies: against the geometry they stand for."""
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -46,6 +49,14 @@ def test_a_goal_that_cannot_be_is_refused_with_its_code(around, goal, code):
     with pytest.raises(GoalRefused) as refusal:
         around.check_goal(np.array(goal))
     assert refusal.value.code is code and "(" in str(refusal.value)
+
+
+def test_what_is_too_heavy_is_refused_before_the_first_push(robot, box):
+    heavy = Surroundings(robot, replace(box, mass=0.3), {}, SETTINGS)
+    with pytest.raises(GoalRefused) as refusal:
+        heavy.check_goal(np.zeros(3))
+    assert refusal.value.code is JobError.TOO_HEAVY
+    assert re.fullmatch(r"too heavy: needs 0\.\d\d N, has 0\.\d\d N", str(refusal.value))
 
 
 def test_a_goal_beside_a_wall_is_taken_and_without_a_map_any(around, robot, box):
