@@ -20,6 +20,10 @@ LIVE: dict[str, dict[str, Any]] = {"controller": {"tracker": {"deadline": 0.03}}
 """Settings of live use, where the scenario is silent. A run in lockstep must not depend on the wall
 clock: there a solve has no deadline [s]."""
 
+LOCKSTEP: dict[str, dict[str, Any]] = {"bridge": {"lockstep_timeout": 60.0}}
+"""Settings of a run in lockstep, where the scenario is silent. All nodes are in one process: who is
+waited for [s] is never dead, it is the machine that is busy."""
+
 MODULES = {
     "bridge": "sim_bridge.node",
     "planner": "push_planner.node",

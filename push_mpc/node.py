@@ -2,6 +2,7 @@
 
 import math
 import sys
+import time
 from typing import Any
 
 import numpy as np
@@ -43,6 +44,7 @@ from push_scenario.scenario import Scenario, load_scenario
 _GIVE_UP = 5.0  # [s] without poses until a task is given up
 _TICK = 0.01  # [s] assumed where the time since the last frame is not known
 _FEEDBACK_EVERY = 10  # frames
+_WATCH = 0.05  # [s] wall time between looks at the pose stream
 
 
 class ControllerNode(Node):
@@ -115,8 +117,9 @@ class ControllerNode(Node):
         bodies = {self.robot, *self._scenario.objects, *self._others}
         self._poses = PoseFeed(self, names, poses, bodies, self._diagnostics, self._on_frame)
         self._heartbeat = HeartbeatWatch(self, names, self.robot, self._poses, self._diagnostics)
+        self._watched = time.monotonic()
         self._watchdog = self.create_timer(
-            0.05, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME)
+            _WATCH, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
 
     def _busy(self) -> None:
@@ -313,6 +316,10 @@ class ControllerNode(Node):
 
     def _on_watchdog(self) -> None:
         """Wall time: the pose stream may be dead, and with it every other clock."""
+        now = time.monotonic()
+        held_up, self._watched = now - self._watched > 2.0 * _WATCH, now
+        if held_up:  # it was this process that stood still: what came meanwhile comes first
+            return
         silence = self._poses.silence
         if not self.tracker.active or silence < 2.0 * self._poses.gate.settings.timeout:
             return

@@ -15,8 +15,9 @@ from rclpy.signals import SignalHandlerOptions
 
 from push_bringup.job_result import JobResult, result_of
 from push_bringup.monitor import Pose
+from push_bringup.node_settings import changed
 from push_bringup.suite import scenario_goals
-from push_bringup.systems import NodeSpec, nodes_of, teams_of
+from push_bringup.systems import LOCKSTEP, NodeSpec, nodes_of, teams_of
 from push_model.arrays import Array
 from push_model.jobs import JobError
 from push_msgs.msg import JobState
@@ -91,8 +92,10 @@ class LockstepRun:
             claim_domain()
         self._stack = ExitStack()
         self.spinner: Spinner | None = None
-        self.scenario = scenario.settings("bridge", lockstep=True)
-        simulated = (world or scenario).settings("bridge", lockstep=True)
+        self.scenario, simulated = (
+            changed(s.settings("bridge", lockstep=True), LOCKSTEP, only_missing=True)
+            for s in (scenario, world or scenario)
+        )
         specs = nodes_of(system, scenario, namespace)
         if not rclpy.ok():
             rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)

@@ -17,6 +17,7 @@ def test_two_teams_reach_their_goals_and_touch_nobody_else(namespace):
         results = run.reach_all()
         own = {n.namespace for n in nodes_of("single", scenario, namespace)}
         names = {t for t, _ in run.supervisor.get_topic_names_and_types()}
+        assert run.bridge.lockstep_timeouts == 0
         for name, team in run.teams.items():
             trace = team.observer.trace
             assert results[name].success, results[name]
@@ -24,8 +25,7 @@ def test_two_teams_reach_their_goals_and_touch_nobody_else(namespace):
             assert position < 2e-3 and orientation < 1e-2
             # contacts of its robot or box with anything but each other
             assert trace.collisions == 0 and trace.contact_losses == 0 and trace.pushes == 1
-        assert run.bridge.lockstep_timeouts == 0
-    world = f"/{namespace}/" if namespace else "/"
+        world = f"/{namespace}/" if namespace else "/"
     ours = {t for t in names if t not in ("/rosout", "/parameter_events")}
     assert ours and all(t.startswith(world) for t in ours)
     assert {f"{world}south/goal_pose", f"{world}north/goal_pose", f"{world}epuck2/cmd_vel"} <= ours
