@@ -2,6 +2,7 @@
 
 import contextlib
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -57,7 +58,9 @@ def running(values, make=lambda bridge: [], folder=None, seed=1, patience=20.0):
         nodes.append(BridgeNode(scenario, autostart=False))
         nodes += make(nodes[0])
         if folder is not None:
-            nodes.append(RecorderNode(folder, scenario, seed))
+            # of a crowd the world's topics are recorded, not three for each robot
+            first = dict(list(scenario.robots.items())[:20])
+            nodes.append(RecorderNode(folder, replace(scenario, robots=first), seed))
         spinner = Spinner(nodes)
         listeners = len(nodes) - 1
         assert spinner.until(lambda: nodes[0].heard_by(listeners) and nodes[0].commanded(), 20.0)
@@ -146,7 +149,7 @@ def test_a_thousand_discs_by_one_message_a_tick(tmp_path):
         assert bridge.lockstep_timeouts == 0
         moved = bridge.world.poses().table - start
         # the first tick's command comes with the first frame
-        assert moved[:, :2] == pytest.approx(0.09 * speed, abs=2e-4)
+        assert moved[:, :2] == pytest.approx(0.09 * speed, abs=7e-4)  # 10 ms to gather speed
     frames = [r.message for r in read_bag(tmp_path / "bag", {"/poses"})]
     assert len(frames) >= 9 and len(frames[-1].names) == 1000
 
