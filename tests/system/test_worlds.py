@@ -88,10 +88,10 @@ def ring_of(count, radius, robot):
 
 
 def test_twenty_robots_with_rings_close_in_on_a_plate(tmp_path):
-    """Half of them push it away, and everything is in the bag."""
+    """All touch it; then one half backs off, the other pushes; everything is in the bag."""
     values = {
         "environment": "open",
-        "robots": ring_of(20, 0.38, "epuck_ring"),
+        "robots": ring_of(20, 0.34, "epuck_ring"),
         "objects": {"plate": {"type": "plate_square", "start": [0, 0, 0], "floor_friction": 0.2}},
         "parameters": {"bridge": {"physics": {"time_step": 0.002, "solver_iterations": 40}}},
     }
@@ -100,8 +100,9 @@ def test_twenty_robots_with_rings_close_in_on_a_plate(tmp_path):
         robots = [f"r{i}" for i in range(1, 21)]
 
         def law(poses, seconds):
-            ahead = np.abs(poses[:, 2]) > np.pi / 2 if seconds > 1.5 else np.full(20, True)
-            return np.column_stack([0.06 * ahead, np.zeros(20), np.zeros(20)])
+            leftward = np.cos(poses[:, 2]) < -0.1
+            speed = np.where(leftward | (seconds < 1.5), 0.08, -0.08)
+            return np.column_stack([speed, np.zeros(20), np.zeros(20)])
 
         return [Commander(robots, law)]
 
