@@ -112,6 +112,23 @@ def run() -> dict[str, Any]:
         f"  deceleration / mu g: mean {mean:.4f}, spread over 16 x 8 {spread:.4f}, "
         f"aside max {np.abs(values[:, 1]).max():.4f}"
     )
+    aside = [
+        replace(item, com=com, shape={"rectangle": {"length": 0.09, "width": 0.12}})
+        for com in ((0.02, 0.0), (-0.015, 0.02), (0.0, -0.03))
+    ]
+    offset = np.array(
+        [
+            deceleration(other, yaw, direction)
+            for other in aside
+            for yaw in np.arange(4) * math.pi / 8
+            for direction in np.arange(4) * math.pi / 2
+        ]
+    )
+    offset_spins = np.array([spin(other, yaw) for other in aside for yaw in (0.0, 0.6)])
+    print(
+        f"  com aside: deceleration {offset[:, 0].min():.4f} .. {offset[:, 0].max():.4f}, "
+        f"spin {offset_spins.min():.4f} .. {offset_spins.max():.4f}"
+    )
     spins = np.array([spin(item, yaw) for yaw in np.arange(8) * math.pi / 16])
     print(f"  spin torque / uniform pressure: {spins.min():.4f} .. {spins.max():.4f}")
     stick, slip = {}, {}
@@ -135,6 +152,8 @@ def run() -> dict[str, Any]:
         "bounds": {
             "deceleration off mu g": at_most(np.abs(values[:, 0] - 1.0).max(), 0.02),
             "isotropy": at_most(spread, 0.03),
+            "deceleration, com aside": at_most(np.abs(offset[:, 0] - 1.0).max(), 0.02),
+            "spin torque, com aside": at_most(np.abs(offset_spins - 1.0).max(), 0.05),
             "spin torque off": at_most(np.abs(spins - 1.0).max(), 0.05),
             "slip at 1.1 r_lim [mm]": at_most(max(stick.values()), 1.0),
             "slip at 0.85 r_lim [mm]": at_least(min(slip.values()), 4.0),

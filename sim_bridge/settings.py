@@ -32,7 +32,7 @@ class MotionCaptureSettings:
 class BridgeSettings:
     """Pace, safety and publishing of the bridge."""
 
-    world: str = bounded("pybullet", doc="which simulation")
+    world: str = "pybullet"
     lockstep: bool = False
     real_time_factor: float = bounded(1.0, low=0.01, high=100.0, doc="pace when not in lockstep")
     command_timeout: float = bounded(0.2, low=0.01, high=5.0, doc="[s] sim time, then wheels stop")

@@ -73,3 +73,38 @@ def test_real_time_pace_catches_up_a_little_and_never_in_a_burst():
     assert pace.due(99.0) == 1 and pace.stalls == 1
     total = sum(pace.due(99.0 + 0.001 * k) for k in range(1, 1001))
     assert total == pytest.approx(200, abs=1)
+
+
+@pytest.mark.parametrize(
+    ("rate", "latency", "ticks"),
+    [(100.0, 0.0, 0), (100.0, 0.01, 1), (30.0, 0.01, 1), (60.0, 0.05, 3), (240.0, 0.01, 3)],
+)
+def test_a_frame_comes_out_at_the_first_tick_at_which_its_latency_has_passed(rate, latency, ticks):
+    capture = MotionCapture(MotionCaptureSettings(rate=rate, latency=latency), 1)
+    assert capture.delay == ticks and ticks / rate >= latency - 1e-9
+    assert ticks == 0 or (ticks - 1) / rate < latency
+
+
+def test_noise_of_a_body_does_not_depend_on_who_else_is_there():
+    settings = MotionCaptureSettings(position_noise=1e-3, orientation_noise=1e-2, dropout=0.2)
+    many = BodyPoses(tuple(f"d{i}" for i in range(1000)), np.zeros((1000, 3)))
+    few = BodyPoses(("d7", "other"), np.zeros((2, 3)))
+    left = BodyPoses(many.names[5:], many.table[5:])  # some are removed in between
+    crowd, pair = MotionCapture(settings, 5), MotionCapture(settings, 5)
+    values = []
+    for k in range(200):
+        a = crowd.observe(k, many if k < 90 else left).poses
+        b = pair.observe(k, few).poses
+        assert ("d7" in a) == ("d7" in b)
+        if "d7" in a:
+            assert np.array_equal(a["d7"], b["d7"])
+        values.append(len(a) / (1000 if k < 90 else 995))
+    assert np.mean(values) == pytest.approx(0.8, abs=0.01)
+
+
+def test_hidden_bodies_are_not_seen_until_their_time():
+    capture = MotionCapture(MotionCaptureSettings(), 1)
+    truth = BodyPoses(("a", "b"), np.zeros((2, 3)))
+    capture.hide(["b"], 5)
+    seen = ["b" in capture.observe(k, truth).poses for k in range(1, 8)]
+    assert seen == [False] * 4 + [True] * 3

@@ -2,6 +2,7 @@
 
 import contextlib
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -57,7 +58,9 @@ def running(values, make=lambda bridge: [], folder=None, seed=1, patience=20.0):
         nodes.append(BridgeNode(scenario, autostart=False))
         nodes += make(nodes[0])
         if folder is not None:
-            nodes.append(RecorderNode(folder, scenario, seed))
+            # of a crowd the world's topics are recorded, not three for each robot
+            first = dict(list(scenario.robots.items())[:20])
+            nodes.append(RecorderNode(folder, replace(scenario, robots=first), seed))
         spinner = Spinner(nodes)
         listeners = len(nodes) - 1
         assert spinner.until(lambda: nodes[0].heard_by(listeners) and nodes[0].commanded(), 20.0)
@@ -85,10 +88,10 @@ def ring_of(count, radius, robot):
 
 
 def test_twenty_robots_with_rings_close_in_on_a_plate(tmp_path):
-    """Half of them push it away, and everything is in the bag."""
+    """All touch it; then one half backs off, the other pushes; everything is in the bag."""
     values = {
         "environment": "open",
-        "robots": ring_of(20, 0.38, "epuck_ring"),
+        "robots": ring_of(20, 0.34, "epuck_ring"),
         "objects": {"plate": {"type": "plate_square", "start": [0, 0, 0], "floor_friction": 0.2}},
         "parameters": {"bridge": {"physics": {"time_step": 0.002, "solver_iterations": 40}}},
     }
@@ -97,8 +100,9 @@ def test_twenty_robots_with_rings_close_in_on_a_plate(tmp_path):
         robots = [f"r{i}" for i in range(1, 21)]
 
         def law(poses, seconds):
-            ahead = np.abs(poses[:, 2]) > np.pi / 2 if seconds > 1.5 else np.full(20, True)
-            return np.column_stack([0.06 * ahead, np.zeros(20), np.zeros(20)])
+            leftward = np.cos(poses[:, 2]) < -0.1
+            speed = np.where(leftward | (seconds < 1.5), 0.08, -0.08)
+            return np.column_stack([speed, np.zeros(20), np.zeros(20)])
 
         return [Commander(robots, law)]
 
@@ -146,7 +150,7 @@ def test_a_thousand_discs_by_one_message_a_tick(tmp_path):
         assert bridge.lockstep_timeouts == 0
         moved = bridge.world.poses().table - start
         # the first tick's command comes with the first frame
-        assert moved[:, :2] == pytest.approx(0.09 * speed, abs=2e-4)
+        assert moved[:, :2] == pytest.approx(0.09 * speed, abs=7e-4)  # 10 ms to gather speed
     frames = [r.message for r in read_bag(tmp_path / "bag", {"/poses"})]
     assert len(frames) >= 9 and len(frames[-1].names) == 1000
 
