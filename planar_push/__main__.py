@@ -1,7 +1,5 @@
 """``python -m planar_push``."""
 
-import sys
+from planar_push.main import command
 
-from planar_push.main import main
-
-sys.exit(main())
+command()

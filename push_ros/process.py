@@ -14,6 +14,7 @@ from typing import IO, Any
 
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError
+from rclpy.action import ActionClient, ActionServer
 from rclpy.exceptions import ParameterException
 from rclpy.experimental import EventsExecutor
 from rclpy.logging import get_logger
@@ -140,6 +141,9 @@ class Spinner:
         """Destroy the nodes. An executor that is left open keeps them in the graph."""
         for node in self.nodes:
             self.executor.remove_node(node)
+            for waitable in list(node.waitables):  # of which rclpy forgets those of actions
+                if isinstance(waitable, (ActionClient, ActionServer)):
+                    waitable.destroy()
             with contextlib.suppress(Exception):
                 node.destroy_node()
         self.nodes.clear()

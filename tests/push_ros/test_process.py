@@ -6,8 +6,10 @@ import sys
 
 import rclpy
 from geometry_msgs.msg import PoseStamped
+from rclpy.action import ActionClient, ActionServer
 from std_msgs.msg import String
 
+from push_msgs.action import MoveObject
 from push_msgs.msg import JobState
 from push_ros.latched import has_publisher, hear_latched
 from push_ros.process import Spinner, heard, own_domain
@@ -42,11 +44,15 @@ def test_a_closed_spinner_leaves_nobody_in_the_graph(ros):
     """Its executor kept the node alive: a worker's next trial would have met the last one's."""
     node = rclpy.create_node("guest")
     node.create_publisher(JobState, "/job_state", LATCHED)
+    server = ActionServer(node, MoveObject, "/move_object", lambda goal: MoveObject.Result())
+    client = ActionClient(node, MoveObject, "/move_object")
     spinner = Spinner([node])
     spinner.once(0.05)
-    assert has_publisher("/job_state", 10.0)
+    feedback = "/move_object/_action/feedback"
+    assert has_publisher("/job_state", 10.0) and has_publisher(feedback, 10.0)
     spinner.close()
-    assert not has_publisher("/job_state", 1.0)
+    assert not has_publisher("/job_state", 1.0) and not has_publisher(feedback, 0.2)
+    assert server is not None and client is not None  # somebody still holds them
 
 
 def test_an_executor_where_standard_error_is_no_file(ros, monkeypatch):
