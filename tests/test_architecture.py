@@ -58,8 +58,8 @@ def imported(path):
 
 
 def is_shell(path):
-    """Whether a file may know ROS: the node of a package, and what only serves it."""
-    return path.name == "node.py" or path.stem.endswith("_node")
+    """Whether a file may know ROS: the node of a package, and how it talks to other nodes."""
+    return path.name in ("node.py", "peers.py")
 
 
 FILES = sources()
