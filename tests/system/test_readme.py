@@ -1,0 +1,109 @@
+"""The README's tables equal the running graph."""
+
+import re
+from pathlib import Path
+
+import pytest
+from rclpy.action import get_action_server_names_and_types_by_node
+
+from push_scenario.scenario import load_scenario
+from push_study.graph_run import LockstepRun
+
+ROOT = Path(__file__).resolve().parents[2]
+ROBOT = "epuck1"
+NODES = {
+    "bridge": ("bridge", "/"),
+    "planner": ("planner", "/"),
+    "controller": ("controller", f"/{ROBOT}"),
+    "supervisor": ("supervisor", "/"),
+}
+OF_ALL = {"/rosout", "/parameter_events", "/diagnostics"}
+
+
+def table(heading):
+    """Rows of the first table that has this column heading, as lists of cells."""
+    lines = (ROOT / "README.md").read_text().splitlines()
+    start = next(i for i, line in enumerate(lines) if line.startswith(f"| {heading} |"))
+    rows = []
+    for line in lines[start + 2 :]:
+        if not line.startswith("|"):
+            return rows
+        rows.append([cell.strip() for cell in line.strip("|").split("|")])
+    return rows
+
+
+def names(cell):
+    return {n.replace("<robot>", ROBOT) for n in re.findall(r"`([^`]+)`", cell)}
+
+
+@pytest.fixture(scope="module")
+def graph():
+    """Of every node: topics that it hears, topics that it tells, what it serves."""
+    with LockstepRun(load_scenario("short"), quiet=True) as run:
+        run.start()
+        found = {}
+        me = run.observer
+        for row, (name, space) in NODES.items():
+            heard = {t for t, _ in me.get_subscriber_names_and_types_by_node(name, space)}
+            told = {t for t, _ in me.get_publisher_names_and_types_by_node(name, space)}
+            served = {t for t, _ in me.get_service_names_and_types_by_node(name, space)}
+            own = f"{space.rstrip('/')}/{name}/"
+            parameters = {
+                s
+                for s in served
+                if s.startswith(own) and ("parameter" in s or "type_description" in s)
+            }
+            actions = {t for t, _ in get_action_server_names_and_types_by_node(me, name, space)}
+            found[row] = (
+                {t for t in heard if "/_action/" not in t} - OF_ALL,
+                {t for t in told if "/_action/" not in t} - OF_ALL,
+                {s for s in served - parameters if "/_action/" not in s} | actions,
+            )
+            assert "/diagnostics" in told, row
+        yield found
+
+
+def test_every_node_has_a_row_and_no_other():
+    assert {row[0] for row in table("node")[:4]} == set(NODES)
+
+
+@pytest.mark.parametrize("node", NODES)
+def test_what_a_node_hears_tells_and_serves(graph, node):
+    (row,) = [r for r in table("node") if r[0] == node]
+    for cell, actual in zip(row[1:], graph[node], strict=True):
+        assert names(cell) == actual, node
+
+
+def test_settings_and_their_defaults_exist():
+    from push_mpc.settings import MpcSettings, TrackerSettings
+    from push_planner import PlannerSettings
+    from push_supervisor import SupervisorSettings
+    from sim_bridge.settings import BridgeSettings, MotionCaptureSettings
+
+    known = {
+        "bridge": (BridgeSettings(), {"motion_capture": MotionCaptureSettings()}),
+        "planner": (PlannerSettings(), {}),
+        "controller": (
+            type("Own", (), {"controller": "ltv"}),
+            {"mpc": MpcSettings(), "tracker": TrackerSettings()},
+        ),
+        "supervisor": (SupervisorSettings(), {}),
+    }
+    lines = (ROOT / "README.md").read_text().splitlines()
+    start = next(i for i, line in enumerate(lines) if line.startswith("| node | parameter |"))
+    rows = [line.strip("|").split("|") for line in lines[start + 2 :] if line.startswith("|")]
+    checked = 0
+    for node, cell, default, _ in [[c.strip() for c in r] for r in rows if r[0].strip() in known]:
+        own, sections = known[node]
+        first = ""
+        for name in re.findall(r"`([^`]+)`", cell):
+            full = first + name if name.startswith(".") else name
+            section, _, field = full.rpartition(".")
+            first = section
+            value = getattr(sections[section] if section else own, field)
+            number = re.match(r"[\d.]+", default)
+            if number and len(re.findall(r"`", cell)) == 2 and isinstance(value, float):
+                scale = 1e-3 if "mm" in default else 1.0
+                assert value == pytest.approx(float(number.group()) * scale), full
+            checked += 1
+    assert checked >= 12
