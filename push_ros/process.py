@@ -3,6 +3,7 @@
 import contextlib
 import ctypes
 import fcntl
+import itertools
 import os
 import signal
 import sys
@@ -24,6 +25,7 @@ from rclpy.signals import SignalHandlerOptions
 from push_model.settings import SettingsError
 
 _claims: dict[int, IO[str]] = {}
+_turns = itertools.count()
 
 
 def prepare_environment(environment: dict[str, str] | None = None) -> dict[str, str]:
@@ -45,11 +47,12 @@ def die_with_parent() -> None:
 def claim_domain() -> int:
     """Set ROS_DOMAIN_ID to one that no other run on this machine has claimed; returns it.
 
-    The claim is a locked file, held until this process ends. Two lockstep runs on one domain would
-    answer each other's frames.
+    The claim is a locked file, held until it is released or this process ends. Two lockstep runs on
+    one domain would answer each other's frames. A domain that was released is not taken again at
+    once: those who were killed in it are remembered there for a while.
     """
-    for offset in range(100):
-        domain = 1 + (os.getpid() + offset) % 100
+    for _ in range(100):
+        domain = 1 + (os.getpid() + next(_turns)) % 100
         path = Path(tempfile.gettempdir()) / f"planar_push_domain_{domain}.lock"
         try:
             file = path.open("a")

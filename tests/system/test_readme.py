@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from rclpy.action import get_action_server_names_and_types_by_node
 
+from push_ros.process import own_domain
 from push_scenario.scenario import load_scenario
 from push_study.graph_run import LockstepRun
 
@@ -39,7 +40,7 @@ def names(cell):
 @pytest.fixture(scope="module")
 def graph():
     """Of every node: topics that it hears, topics that it tells, what it serves."""
-    with LockstepRun(load_scenario("short"), quiet=True) as run:
+    with own_domain(), LockstepRun(load_scenario("short"), quiet=True) as run:
         run.start()
         found = {}
         me = run.observer

@@ -249,7 +249,7 @@ WALL = EnvironmentSpec((3.0, 2.0), boxes=(BoxSpec((-0.15, 0.15), (0.06, 0.5)),))
 
 @pytest.mark.parametrize("name", ["PLANNING", "POSITIONING", "PUSHING"])
 def test_a_new_map_is_minded_at_once(run, name):
-    """Row 11 of issue 7: a wall appears across the way; the plan that is driven knows it."""
+    """A wall appears across the way; the plan that is driven knows it."""
     run.by_topic(run.goal)
     run.enters(name)
     run.maps.publish(grid_to_ros(rasterise(WALL), 0.0))
@@ -332,7 +332,7 @@ def test_a_body_on_the_goal_is_waited_for():
         begun = run.run.bridge.time
         run.until(lambda: run.run.bridge.time > begun + 2.5, 5.0)
         assert run.state.state_name == "PLANNING" and not run.driven
-        run.run.bridge.world.objects["crate"].place(np.array([0.8, 0.7, 0.0]))
+        run.run.bridge.world.place("crate", np.array([0.8, 0.7, 0.0]))
         run.reached(run.goal)
 
 
