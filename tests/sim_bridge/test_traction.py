@@ -80,7 +80,7 @@ def test_what_is_not_too_heavy_moves_as_commanded_and_what_is_stands_or_creeps(n
 
 
 def test_a_heavy_box_is_too_heavy_at_axle_height_and_not_for_a_low_ring():
-    """Issue 7, 1.3: a box of 0.3 kg."""
+    """A box of 0.3 kg."""
     epuck, box = types("epuck")
     heavy = replace(box, mass=0.3)
     assert too_heavy(epuck, box) is None
