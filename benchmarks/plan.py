@@ -52,7 +52,8 @@ def problems(
     def draw(random: np.random.Generator) -> np.ndarray:
         while True:
             pose = random.uniform([x0, y0, -np.pi], [x1, y1, np.pi])
-            if planner.scene.object_clearance(pose) >= planner.settings.safety_distance:
+            centre = planner.scene.item.mass_pose(pose)
+            if planner.scene.object_clearance(centre) >= planner.settings.safety_distance:
                 return pose
 
     for number in range(count):
@@ -81,6 +82,7 @@ def attempt(planner: PushPlanner, start: np.ndarray, goal: np.ndarray) -> Outcom
 def exhaustive(planner: PushPlanner, start: np.ndarray, goal: np.ndarray, seed: int) -> float:
     """Cost [m] of the plan that a search finds that spares no effort; inf when it finds none."""
     scene = planner.scene
+    start, goal = scene.item.mass_pose(start), scene.item.mass_pose(goal)
     random = np.random.default_rng(seed)
     x0, x1, y0, y1 = scene.field.grid.extent
     anywhere = random.uniform([x0, y0, -np.pi], [x1, y1, np.pi], (_POSES, 3))

@@ -216,7 +216,7 @@ def _outline_square(field: Any, points: Any, x0: float, y0: float, c: float, s: 
 
 
 @numba.njit(cache=True, fastmath=True)
-def _holds_obstacle(field: Any, points: Any, pose: Any, ox: float, oy: float, scale: float) -> bool:
+def holds_obstacle(field: Any, points: Any, pose: Any, ox: float, oy: float, scale: float) -> bool:
     """Whether an occupied corner of a cell lies inside a closed outline at a pose."""
     n = points.shape[0]
     c, s = math.cos(pose[2]), math.sin(pose[2])
@@ -296,7 +296,7 @@ class DistanceField:
     def clearance(self, outline: Array, pose: Array) -> float:
         """[m] of a body with a closed outline ``(n, 2)`` at a pose ``(3,)``; 0 on overlap."""
         pose = np.asarray(pose, dtype=np.float64)
-        if _holds_obstacle(self.values, outline, pose, *self.args):
+        if holds_obstacle(self.values, outline, pose, *self.args):
             return 0.0
         return float(points_clearance(self.values, outline, pose[0], pose[1], pose[2], *self.args))
 

@@ -20,7 +20,9 @@ from push_msgs.action import PlanPush
 from push_msgs.msg import PushPlan as PlanMessage
 from push_msgs.srv import PlanRobotPath
 from push_planner import (
+    DistanceField,
     NoRobotPath,
+    PlanError,
     PlannerSettings,
     PlanningFailed,
     Progress,
@@ -74,6 +76,7 @@ class PlannerNode(Node):
         )
         self._planners: dict[tuple[str, str], PushPlanner] = {}
         self._grid: Grid | None = None
+        self._field: DistanceField | None = None  # of the grid
         self._work: Iterator[Progress] | None = None
         self._best: PushPlan | None = None
         self._pending = False
@@ -106,7 +109,7 @@ class PlannerNode(Node):
         )
         self._grid = self._scenario.grid  # to warm up, until a map comes
         self._warm_up()
-        self._grid = None
+        self._grid = self._field = None
         self._planners.clear()
 
     @property
@@ -129,7 +132,7 @@ class PlannerNode(Node):
             return
         if self._grid is not None and self._grid.equals(grid):
             return
-        self._grid = grid
+        self._grid, self._field = grid, None
         self._planners.clear()
         if self._pending or self._work is not None:
             self._begin(self._request)
@@ -139,13 +142,25 @@ class PlannerNode(Node):
             self._pending = False
             self._fail(PlanPush.Result.NO_MAP, "no map has been received on /map")
 
-    def _planner(self, robot: str, item: str) -> PushPlanner:
+    def _distances(self) -> DistanceField:
         assert self._grid is not None
+        if self._field is None:
+            self._field = DistanceField(self._grid)
+        return self._field
+
+    def _planner(self, robot: str, item: str) -> PushPlanner:
+        """Raises SettingsError for names that are not known, PlanningFailed for a robot that is not
+        made for pushing."""
         robot, robot_spec = self._scenario.robot(robot)
         item, item_spec = self._scenario.object(item)
         key = (robot, item)
         if key not in self._planners:
-            self._planners[key] = PushPlanner(self.settings, self._grid, robot_spec, item_spec)
+            try:
+                planner = PushPlanner(self.settings, self._distances(), robot_spec, item_spec)
+            except SettingsError as error:
+                why = f"robot '{robot}' cannot push '{item}': {error}"
+                raise PlanningFailed(PlanError.NO_PUSH_SEQUENCE, why) from None
+            self._planners[key] = planner
         return self._planners[key]
 
     def _warm_up(self) -> None:
@@ -153,14 +168,13 @@ class PlannerNode(Node):
         if not self._scenario.objects:
             return
         start = next(iter(self._scenario.objects.values()))[1]
-        planner = self._planner("", "")
-        quick = replace(planner.settings, improvement_rounds=0, rrt_iterations=50, max_expansions=2)
-        trial = PushPlanner(
-            quick, planner.scene.field.grid, planner.scene.robot, planner.scene.item
-        )
         ahead = start + np.array([0.3 * np.cos(start[2]), 0.3 * np.sin(start[2]), 0.0])
         try:
-            trial.solve(start, ahead)
+            scene = self._planner("", "").scene
+            quick = replace(
+                self.settings, improvement_rounds=0, rrt_iterations=50, max_expansions=2
+            )
+            PushPlanner(quick, scene.field, scene.robot, scene.item).solve(start, ahead)
         except PlanningFailed as error:
             self.get_logger().debug(f"warm-up: {error}")
 
@@ -190,9 +204,16 @@ class PlannerNode(Node):
             self._fail(PlanPush.Result.INVALID_GOAL, str(error))
         except SettingsError as error:
             self._fail(PlanPush.Result.UNKNOWN_OBJECT, str(error))
+        except PlanningFailed as error:
+            self._fail(int(error.code), str(error))
 
     def _plan(self, request: Any, start: Array, goal: Array) -> Iterator[Progress]:
-        """The work on a request, in slices; raises InvalidMessage and SettingsError."""
+        """The work on a request, in slices.
+
+        Raises
+        ------
+        InvalidMessage, SettingsError, PlanningFailed: at once, of what is wrong with the request.
+        """
         planner = self._planner(request.robot, request.object)
         problem = too_heavy(planner.scene.robot, planner.scene.item)
         if problem is not None:
@@ -202,7 +223,7 @@ class PlannerNode(Node):
             if circles[:, 2].min() < 0.0:
                 raise InvalidMessage("an obstacle's radius must not be negative")
             scene, margin = planner.scene, self.settings.safety_distance
-            grid = with_bodies(scene.field.grid, circles, scene.shape.outline, start, margin)
+            grid = with_bodies(scene.field.grid, circles, scene.item.outline, start, margin)
             planner = PushPlanner(self.settings, grid, scene.robot, scene.item)
         if request.mode == PlanPush.Goal.DIRECT:
             return planner.plan(start, goal)
@@ -281,10 +302,9 @@ class PlannerNode(Node):
             if self._grid is None:
                 raise NoRobotPath(response.NO_MAP, "no map has been received on /map")
             start, goal = planar_pose(request.start, "start"), planar_pose(request.goal, "goal")
-            planner = self._planner(request.robot, "")
             trajectory = plan_robot_path(
-                planner.scene.field,
-                planner.scene.robot,
+                self._distances(),
+                self._scenario.robot(request.robot)[1],
                 self.settings,
                 start,
                 goal,

@@ -63,7 +63,11 @@ class PlanStatistics:
 
 @dataclass(frozen=True)
 class PushPlan:
-    """cost [m]: g(q) of (2.10); length [m] of all pushes; clearance [m]; the guide path used."""
+    """cost [m]: g(q) of (2.10); length [m] of all pushes; clearance [m]; the guide path used.
+
+    goal ``(3,)`` and the segments' poses are of the object's geometric frame, the guide path is of
+    its centre of mass.
+    """
 
     goal: Array
     segments: tuple[PushSegment, ...]
@@ -119,13 +123,26 @@ class _Work:
 
 
 class PushPlanner:
-    """Plans pushes of one object by one robot on one map."""
+    """Plans pushes of one object by one robot on one map.
+
+    Poses of the object that come in and go out are of its geometric frame; within, of its centre of
+    mass (see ``ObjectSpec``).
+    """
 
     def __init__(
-        self, settings: PlannerSettings, grid: OccupancyGrid, robot: RobotSpec, item: ObjectSpec
+        self,
+        settings: PlannerSettings,
+        grid: OccupancyGrid | DistanceField,
+        robot: RobotSpec,
+        item: ObjectSpec,
     ) -> None:
+        """Raises SettingsError where the robot cannot push: no flat bumper, no two wheels.
+
+        grid: the map, or its distance field where that has been made already.
+        """
         self.settings = settings
-        self.scene = PushScene(DistanceField(grid), robot, item, settings)
+        field = grid if isinstance(grid, DistanceField) else DistanceField(grid)
+        self.scene = PushScene(field, robot, item, settings)
 
     def check(self, pose: Array, what: str, occupied: PlanError) -> None:
         """Raise PlanningFailed unless the object can stand at the pose ``(3,)``."""
@@ -140,7 +157,7 @@ class PushPlanner:
                 f"the {what} {where} lies outside the map, x in [{x0:.2f}, {x1:.2f}], "
                 f"y in [{y0:.2f}, {y1:.2f}] m",
             )
-        if self.scene.object_clearance(pose) <= 0.0:
+        if self.scene.object_clearance(self.scene.item.mass_pose(pose)) <= 0.0:
             raise PlanningFailed(
                 occupied, f"at the {what} {where} the object would overlap an obstacle"
             )
@@ -158,7 +175,8 @@ class PushPlanner:
             for side in self.scene.sides
             for kappa in (side.trusted.minimum, side.trusted.maximum)
         )
-        straight = float(np.hypot(*(goal - start)[:2]))
+        item = self.scene.item
+        straight = float(np.hypot(*(item.mass_pose(goal) - item.mass_pose(start))[:2]))
         return straight / float(max(fastest, 1.0)) + self.settings.push_cost
 
     def plan(self, start: Array, goal: Array, seed: int | None = None) -> Iterator[Progress]:
@@ -180,6 +198,8 @@ class PushPlanner:
         self.check(goal, "goal", PlanError.GOAL_OCCUPIED)
         self._check_room(start, "pushed away from the start")
         self._check_room(goal, "pushed into the goal")
+        ends = start, goal
+        start, goal = (self.scene.item.mass_pose(pose) for pose in ends)
         guides = []
         for guide in self._guides(start, goal, work.seed):
             guides.append(guide)
@@ -210,12 +230,12 @@ class PushPlanner:
                 if search.solution is not None or search.exhausted:
                     break
             if search.solution is not None:
-                best = self._assemble(search, goal, guide, work)
+                best = self._assemble(search, ends[1], guide, work)
                 break
         if best is None:
-            raise PlanningFailed(PlanError.NO_PUSH_SEQUENCE, self._why_not(start, goal, work))
+            raise PlanningFailed(PlanError.NO_PUSH_SEQUENCE, self._why_not(*ends, work))
         yield Progress("improving", best)
-        least = self.lower_bound(start, goal)
+        least = self.lower_bound(*ends)
         work.left = settings.improvement_expansions
         for number in range(settings.improvement_rounds):
             bound = (1.0 - _WORTH) * best.cost
@@ -224,7 +244,7 @@ class PushPlanner:
             if number == 0:
                 graph = self._graph(start, goal, guides[-1], 1, settings.scattered_poses[-1], work)
             else:
-                between = [s.object_end for s in best.segments[:-1]]
+                between = [self.scene.item.mass_pose(s.object_end) for s in best.segments[:-1]]
                 if not between:
                     break
                 size = settings.refinement / 2.0 ** ((number - 1) / 2)
@@ -235,7 +255,7 @@ class PushPlanner:
                 yield Progress(f"improving, round {number + 1}", best)
             work.left -= search.expanded
             if search.solution is not None and search.cost < best.cost:
-                best = self._assemble(search, goal, best.guide, work)
+                best = self._assemble(search, ends[1], best.guide, work)
                 yield Progress("improving", best)
         yield Progress("done", best)
 
@@ -257,9 +277,10 @@ class PushPlanner:
 
     def _check_room(self, pose: Array, what: str) -> None:
         """Raise PlanningFailed when the object can be pushed on no side at the pose ``(3,)``."""
+        centre = self.scene.item.mass_pose(pose)
         where = f"({pose[0]:.3f}, {pose[1]:.3f}, {pose[2]:.3f})"
         needed = self.settings.safety_distance
-        clearance = self.scene.object_clearance(pose)
+        clearance = self.scene.object_clearance(centre)
         if clearance < needed:
             raise PlanningFailed(
                 PlanError.NO_PUSH_SEQUENCE,
@@ -270,15 +291,17 @@ class PushPlanner:
         if not sides:
             raise PlanningFailed(
                 PlanError.NO_PUSH_SEQUENCE,
-                "no side of the object can be pushed: on none is the straight push stable",
+                f"no side of the object can be pushed: {self.scene.why_no_sides()}",
             )
-        contacts = np.array([side.robot_pose(pose) for side in sides])
-        if not self.scene.rooms(contacts).any():
+        if not any(self.scene.has_room(side.robot_pose(centre), side) for side in sides):
+            behind = ", ".join(
+                f"{side.index} ({1e3 * self.scene.back(side):.0f} mm)" for side in sides
+            )
             raise PlanningFailed(
                 PlanError.NO_PUSH_SEQUENCE,
-                f"no side of the object can be {what} {where}: behind each of its {len(sides)} "
-                f"sides the robot, which needs {1e3 * needed:.1f} mm around it and "
-                f"{1e3 * self.settings.standoff:.0f} mm to back off, would touch an obstacle",
+                f"no side of the object can be {what} {where}: behind each that can be pushed the "
+                f"robot, which needs {1e3 * needed:.1f} mm around it and some way to back off, "
+                f"would touch an obstacle: sides {behind}",
             )
 
     def _why_not(self, start: Array, goal: Array, work: "_Work") -> str:
@@ -323,25 +346,25 @@ class PushPlanner:
             ) from None
 
     def segment(self, step: PushStep) -> PushSegment:
-        """A push with its time-parametrised reference."""
+        """A push with its time-parametrised reference; object poses in the geometric frame."""
         count = max(20, int(step.curve.length / 0.005))
         points, heading, curvature = step.curve.sample(count)
         trajectory = along_curve(
             points,
             heading,
             curvature,
-            self.scene.robot.differential,
+            self.scene.drive,
             self.settings.push_speed,
             self.settings.push_acceleration,
         )
-        curve = step.curve
+        curve, item = step.curve, self.scene.item
         return PushSegment(
             step.side.index,
-            step.object_start,
-            step.object_end,
+            item.geometric_pose(step.object_start),
+            item.geometric_pose(step.object_end),
             curve.start,
             curve.end,
-            self.scene.standoff(curve.start),
+            self.scene.standoff(curve.start, step.side),
             curve.k_start,
             curve.k_end,
             curve.length,

@@ -34,18 +34,19 @@ def preemptive_pushes(
     """
     random = np.random.default_rng(seed)
     scene = planner.scene
+    start, goal = scene.item.mass_pose(start), scene.item.mass_pose(goal)
     needed = scene.settings.safety_distance
     found: list[tuple[float, PushSegment]] = []
     for side in scene.sides:
         drawn = random.uniform(0.95 * side.trusted.minimum, 0.95 * side.trusted.maximum, curvatures)
         begin = side.robot_pose(start)
-        if not scene.has_room(begin):
+        if not scene.has_room(begin, side):
             continue
         for curvature in [0.0, *drawn]:
             for length in lengths:
                 end = unicycle_step(begin, length, length * curvature, 1.0)
                 curve = shortest_push_curve(begin, end, side.trusted.minimum, side.trusted.maximum)
-                if curve is None or not scene.has_room(end):
+                if curve is None or not scene.has_room(end, side):
                     continue
                 clearance = scene.curve_clearance(curve, side, needed)
                 if clearance < needed:

@@ -41,7 +41,10 @@ class SearchStatistics:
 
 @dataclass(frozen=True)
 class PushStep:
-    """One push of a sequence: side, curve, object poses before and after, clearance [m]."""
+    """One push of a sequence: side, curve, object poses before and after, clearance [m].
+
+    Poses ``(3,)`` of the object's centre of mass.
+    """
 
     side: PushSide
     curve: PushCurve
@@ -87,7 +90,12 @@ class PushGraph:
             position = self.poses[:, :2] + np.column_stack([c * x - s * y, s * x + c * y])
             robots.append(np.column_stack([position, heading, np.cos(heading), np.sin(heading)]))
         self.robots = np.array(robots)
-        self.room = np.array([scene.rooms(np.ascontiguousarray(r[:, :3])) for r in robots])
+        self.room = np.array(
+            [
+                scene.rooms(np.ascontiguousarray(r[:, :3]), side)
+                for r, side in zip(robots, scene.sides, strict=True)
+            ]
+        )
         self.diameters = np.array(
             [[2.0 / s.trusted.maximum, -2.0 / s.trusted.minimum] for s in scene.sides]
         )

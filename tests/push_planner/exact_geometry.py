@@ -38,19 +38,26 @@ def corners_of(box):
     return half @ np.array([[c, s], [-s, c]]) + box.centre
 
 
+def _edges(polygons):
+    """Both ends (..., n, 2) of the sides of polygons."""
+    return polygons, np.roll(polygons, -1, axis=-2)
+
+
 def _point_segments(points, a, b):
-    """(n, m) distances of points from segments."""
+    """(..., n, m) distances of points (..., n, 2) from segments (..., m, 2)."""
     along = b - a
-    t = ((points[:, None] - a) * along).sum(-1) / (along * along).sum(-1)
-    nearest = a + np.clip(t, 0.0, 1.0)[..., None] * along
-    return np.hypot(*np.moveaxis(points[:, None] - nearest, -1, 0))
+    offset = points[..., :, None, :] - a[..., None, :, :]
+    along = along[..., None, :, :]
+    t = (offset * along).sum(-1) / (along * along).sum(-1)
+    apart = offset - np.clip(t, 0.0, 1.0)[..., None] * along
+    return np.hypot(apart[..., 0], apart[..., 1])
 
 
 def _inside(points, polygon):
-    """Whether points lie in a convex polygon."""
-    a, b = polygon, np.roll(polygon, -1, axis=0)
-    side = _cross(b - a, points[:, None] - a)
-    return (side >= 0.0).all(axis=1) | (side <= 0.0).all(axis=1)
+    """Whether points (..., n, 2) lie in a convex polygon (..., m, 2)."""
+    a, b = _edges(polygon)
+    side = _cross((b - a)[..., None, :, :], points[..., :, None, :] - a[..., None, :, :])
+    return (side >= 0.0).all(axis=-1) | (side <= 0.0).all(axis=-1)
 
 
 def _cross(u, v):
@@ -58,33 +65,37 @@ def _cross(u, v):
 
 
 def _sides_cross(p, q):
-    """Whether any sides of two closed polygons cross."""
-    a, b, c, d = p, np.roll(p, -1, axis=0), q, np.roll(q, -1, axis=0)
+    """Whether any sides of closed polygons (..., n, 2) and (..., m, 2) cross."""
+    (a, b), (c, d) = _edges(p), _edges(q)
+    a, b, c, d = a[..., :, None, :], b[..., :, None, :], c[..., None, :, :], d[..., None, :, :]
 
     def turn(u, v, w):
         return _cross(v - u, w - u)
 
-    a, b, c, d = a[:, None], b[:, None], c[None], d[None]
-    return bool(((turn(a, b, c) * turn(a, b, d) < 0) & (turn(c, d, a) * turn(c, d, b) < 0)).any())
+    apart = (turn(a, b, c) * turn(a, b, d) < 0) & (turn(c, d, a) * turn(c, d, b) < 0)
+    return apart.any(axis=(-2, -1))
 
 
 def convex_distance(p, q):
-    """Exact distance of two convex polygons, 0 on overlap."""
-    if _inside(p, q).any() or _inside(q, p).any() or _sides_cross(p, q):
-        return 0.0
-    return min(
-        _point_segments(p, q, np.roll(q, -1, axis=0)).min(),
-        _point_segments(q, p, np.roll(p, -1, axis=0)).min(),
-    )
+    """Exact distance of convex polygons (..., n, 2) and (m, 2), 0 on overlap."""
+    q = np.broadcast_to(q, (*p.shape[:-2], *q.shape))
+    met = _inside(p, q).any(axis=-1) | _inside(q, p).any(axis=-1) | _sides_cross(p, q)
+    there = _point_segments(p, *_edges(q)).min(axis=(-2, -1))
+    back = _point_segments(q, *_edges(p)).min(axis=(-2, -1))
+    return np.where(met, 0.0, np.minimum(there, back))
+
+
+def _solid(world):
+    """Convex polygons of boxes and polygons."""
+    return [corners_of(b) for b in world.boxes] + [np.array(p.vertices) for p in world.polygons]
 
 
 def points_distance(world, points):
     """Exact distances of points ``(n, 2)`` from all that is solid in a world, walls included."""
     points = np.asarray(points, dtype=float).reshape(-1, 2)
     least = (np.array(world.size) / 2.0 - np.abs(points)).min(axis=1)
-    shapes = [corners_of(b) for b in world.boxes] + [np.array(p.vertices) for p in world.polygons]
-    for shape in shapes:
-        gap = _point_segments(points, shape, np.roll(shape, -1, axis=0)).min(axis=1)
+    for shape in _solid(world):
+        gap = _point_segments(points, *_edges(shape)).min(axis=1)
         least = np.minimum(least, np.where(_inside(points, shape), 0.0, gap))
     for circle in world.circles:
         least = np.minimum(least, np.hypot(*(points - circle.centre).T) - circle.radius)
@@ -92,14 +103,20 @@ def points_distance(world, points):
 
 
 def body_distance(world, body):
-    """Exact distance of a convex body ``(n, 2)`` from all that is solid in a world."""
-    least = float((np.array(world.size) / 2.0 - np.abs(body)).min())
-    shapes = [corners_of(b) for b in world.boxes] + [np.array(p.vertices) for p in world.polygons]
-    least = min([least, *(convex_distance(body, shape) for shape in shapes)])
+    """Exact distances of convex bodies ``(..., n, 2)`` from all that is solid in a world."""
+    least = (np.array(world.size) / 2.0 - np.abs(body)).min(axis=(-2, -1))
+    for shape in _solid(world):
+        least = np.minimum(least, convex_distance(body, shape))
     for circle in world.circles:
-        centre = np.array([circle.centre])
-        if _inside(centre, body).any():
-            return 0.0
-        gap = float(_point_segments(centre, body, np.roll(body, -1, axis=0)).min())
-        least = min(least, gap - circle.radius)
-    return max(least, 0.0)
+        centre = np.broadcast_to(np.array([circle.centre]), (*body.shape[:-2], 1, 2))
+        gap = _point_segments(centre, *_edges(body)).min(axis=(-2, -1)) - circle.radius
+        least = np.minimum(least, np.where(_inside(centre, body).any(axis=-1), 0.0, gap))
+    return np.maximum(least, 0.0)
+
+
+def placed(poses, body):
+    """A body (n, 2) at poses (k, 3): (k, n, 2)."""
+    c, s = np.cos(poses[:, 2])[:, None], np.sin(poses[:, 2])[:, None]
+    x, y = body.T
+    turned = np.stack([c * x - s * y, s * x + c * y], axis=-1)
+    return turned + poses[:, None, :2]

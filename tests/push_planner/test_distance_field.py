@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from push_model import se2
 from push_model.occupancy import OccupancyGrid, rasterise
 from push_model.shapes import densified, rectangle
 from push_planner.distance_field import DistanceField, between_samples, piece_square
 from tests.push_planner.exact_geometry import (
     body_distance,
     convex_distance,
+    placed,
     points_distance,
     random_world,
 )
@@ -48,15 +48,16 @@ def test_points_bodies_and_segments_against_exact_geometry(resolution):
         spots = random.uniform([-1.5, -1.0], [1.5, 1.0], (30, 2))
         found = np.array([field.at(x, y) for x, y in spots])
         lacking["point"].extend(points_distance(world, spots) - found)
-        for spot in spots[:4]:
-            pose = np.array([*spot, random.uniform(-np.pi, np.pi)])
-            body = BODIES[number % 3]
-            exact = body_distance(world, se2.transform(pose, body))
-            lacking["body"].append(exact - field.clearance(densified(body, 0.01), pose))
-        for a, b in zip(spots[:4], spots[4:8], strict=True):
-            along = a + np.linspace(0.0, 1.0, 200)[:, None] * (b - a)
-            exact = points_distance(world, along).min()  # never less than the segment's own
-            lacking["segment"].append(exact - field.segment(a, b))
+        body = BODIES[number % 3]
+        poses = np.column_stack([spots[:4], random.uniform(-np.pi, np.pi, 4)])
+        outline = densified(body, 0.01)
+        found = np.array([field.clearance(outline, pose) for pose in poses])
+        lacking["body"].extend(body_distance(world, placed(poses, body)) - found)
+        t = np.linspace(0.0, 1.0, 100)[:, None, None]
+        exact = points_distance(world, spots[:4] + t * (spots[4:8] - spots[:4]))
+        exact = exact.reshape(100, 4).min(axis=0)  # never less than the segments' own
+        ends = zip(spots[:4], spots[4:8], strict=True)
+        lacking["segment"].extend(exact - [field.segment(a, b) for a, b in ends])
     for what, gaps in lacking.items():
         gaps = np.array(gaps)
         print(f"{resolution}: {what}: {gaps.max():.5f} mean {gaps.mean():.5f} of {len(gaps)}")
@@ -81,14 +82,14 @@ def test_hardly_less_than_exact_on_the_map_itself():
         field = DistanceField(grid)
         squares = [np.array([[a, c], [b, c], [b, d], [a, d]]) for a, b, c, d in grid.rectangles()]
         empty = random_world(random, 0)
-        for _ in range(10):
-            pose = np.array([*random.uniform([-1.4, -0.9], [1.4, 0.9]), random.uniform(-4, 4)])
-            body = BODIES[random.integers(3)]
-            placed = se2.transform(pose, body)
-            exact = min(
-                [body_distance(empty, placed), *(convex_distance(placed, s) for s in squares)]
-            )
-            lost.append(exact - field.clearance(densified(body, 0.01), pose))
+        body = BODIES[random.integers(3)]
+        poses = random.uniform([-1.4, -0.9, -4.0], [1.4, 0.9, 4.0], (10, 3))
+        bodies = placed(poses, body)
+        exact = np.min(
+            [body_distance(empty, bodies), *(convex_distance(bodies, s) for s in squares)], axis=0
+        )
+        outline = densified(body, 0.01)
+        lost.extend(exact - [field.clearance(outline, pose) for pose in poses])
     lost = np.array(lost)
     print(f"lost {lost.max():.6f} mean {lost.mean():.6f}")
     assert lost.min() > -1e-9 and lost.max() < 0.0005 and lost.mean() < 0.0002

@@ -155,3 +155,16 @@ def test_a_cancel_ends_it_at_once(client):
     handle.cancel_goal_async()
     assert client.result(handle).error_code == R.CANCELED
     assert client.planner._work is None
+
+
+def test_a_robot_that_cannot_push_starts_and_says_so(ros):
+    scenario = load_scenario("short")
+    ring = load_scenario("ring20").robot()[1]
+    robots = {name: (ring, *rest) for name, (_, *rest) in scenario.robots.items()}
+    client = Client(replace(scenario, robots=robots))
+    try:
+        result = client.result(client.send())
+        assert result.error_code == R.NO_PUSH_SEQUENCE
+        assert "a flat bumper is needed" in result.error_msg and "'box'" in result.error_msg
+    finally:
+        client.spinner.close()

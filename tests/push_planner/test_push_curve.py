@@ -29,10 +29,10 @@ def finish(start, distance, bearing, turn):
 def test_boundary_conditions_of_the_corrected_formula(start, distance, bearing, turn, ki, kf):
     """Errata (2.4): with +3 p_i the end tangents are k_i and k_f long, in the poses' directions."""
     end = finish(start, distance, bearing, turn)
-    points, _, _ = PushCurve(start, end, ki, kf, 0.0).sample(200001)
+    points, _, _ = PushCurve(start, end, ki, kf, 0.0).sample(20001)
     assert points[0] == pytest.approx(start[:2]) and points[-1] == pytest.approx(end[:2])
-    first = (points[1] - points[0]) * 200000
-    last = (points[-1] - points[-2]) * 200000
+    first = (points[1] - points[0]) * 20000
+    last = (points[-1] - points[-2]) * 20000
     assert first == pytest.approx(ki * np.array([math.cos(start[2]), math.sin(start[2])]), abs=1e-3)
     assert last == pytest.approx(kf * np.array([math.cos(end[2]), math.sin(end[2])]), abs=1e-3)
 

@@ -119,7 +119,7 @@ def test_a_bound_is_never_exceeded_and_an_exhausted_search_says_so(scene):
         assert hasty.solution is not None or (hasty.expanded == 1 and not hasty.exhausted)
 
 
-def test_sweeps_are_as_clear_as_their_samples_one_by_one(scene):
+def test_sweeps_are_hardly_less_clear_than_their_poses_one_by_one(scene):
     random = np.random.default_rng(5)
     compared = 0
     for _ in range(200):
@@ -129,14 +129,14 @@ def test_sweeps_are_as_clear_as_their_samples_one_by_one(scene):
         curve = shortest_push_curve(start, end, side.trusted.minimum, side.trusted.maximum)
         if curve is None:
             continue
-        points, heading, _ = curve.sample(max(8, int(curve.length / 0.01) + 2))
+        points, heading, _ = curve.sample(max(8, int(curve.length / 0.004) + 2))
         least = np.inf
         for pose in np.column_stack([points, heading]):
             item = se2.compose(pose, side.grasp)
             outline = scene.field.clearance(scene.shape.dense_outline(0.01), item)
             least = min(least, scene.robot_clearance(pose), outline)
         swept = scene.curve_clearance(curve, side, -1.0)
-        assert swept == pytest.approx(least, abs=1e-6)
+        assert least - 0.001 <= swept <= least + 1e-9
         compared += least > 0.0
     assert compared > 20
 
