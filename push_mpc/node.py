@@ -272,12 +272,17 @@ class ControllerNode(Node):
         self._publish_status(None)
 
     def _bodies(self) -> Array:
-        """Other bodies to keep away from ``(n, 3)``: x, y, least distance of the axle midpoint."""
+        """Other bodies to keep away from ``(n, 3)``: x, y, least distance of the axle midpoint.
+
+        One that came closer than that is not fled from: it must come no closer.
+        """
         rows = []
+        me = self._poses.pose(self.robot)
         for name, reach in self._others.items():
             pose = None if name == self._object else self._poses.pose(name)
-            if pose is not None:
-                rows.append((pose[0], pose[1], reach))
+            if pose is not None and me is not None:
+                gap = math.hypot(pose[0] - me[0], pose[1] - me[1])
+                rows.append((pose[0], pose[1], min(reach, gap)))
         return np.array(rows, dtype=np.float64).reshape(-1, 3)
 
     def _publish_command(self, v: float, omega: float) -> None:

@@ -33,7 +33,6 @@ def crowd(scenario, robots, items):
         scenario,
         robots={f"r{i}": (robot, np.zeros(3)) for i in range(robots)},
         objects={f"box{i}": (box, np.zeros(3)) for i in range(items)},
-        goal=None,
     )
 
 

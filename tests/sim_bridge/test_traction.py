@@ -64,7 +64,7 @@ def case(name: str, target: float, random: np.random.Generator) -> tuple[RobotSp
     return robot, item
 
 
-@pytest.mark.parametrize("name", sorted(PUSHED))
+@pytest.mark.parametrize("name", sorted(set(PUSHED) - {"pioneer"}))
 def test_what_is_not_too_heavy_moves_as_commanded_and_what_is_stands_or_creeps(name):
     """Masses x heights x frictions; from 1 to 1.25 times the traction is left undecided."""
     random = np.random.default_rng(7)
@@ -77,6 +77,12 @@ def test_what_is_not_too_heavy_moves_as_commanded_and_what_is_stands_or_creeps(n
             assert too_heavy(robot, item) is None and 0.96 < way < 1.04, (way, what)
         else:
             assert too_heavy(robot, item) is not None and way < 0.7, (way, what)
+
+
+def test_a_robot_driven_by_torques_is_not_judged():
+    """Its wheels may slip and push all the same."""
+    pioneer, box = types("pioneer")
+    assert too_heavy(pioneer, replace(box, mass=100.0)) is None
 
 
 def test_a_heavy_box_is_too_heavy_at_axle_height_and_not_for_a_low_ring():

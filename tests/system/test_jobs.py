@@ -166,9 +166,7 @@ def test_the_same_goal_again_is_answered_again(jobs):
 def test_poses_that_are_silent_for_long_end_a_goal_as_such(jobs):
     """FAULTS 7: the supervisor says that it has no poses, not that it cannot plan."""
     supervisor = jobs.run.supervisor
-    supervisor.settings = supervisor.machine.settings = type(supervisor.settings)(
-        pose_timeout=0.3, node_timeout=0.6
-    )
+    supervisor._apply(type(supervisor.settings)(pose_timeout=0.3, node_timeout=0.6))
     jobs.run.bridge.running = False
     assert jobs.run.spinner.until(lambda: supervisor._pose("box") is None, 5.0)
     jobs.run.observer.send_goal(jobs.goal)

@@ -70,6 +70,7 @@ class Run:
         return self.until(lambda: self.state.state_name == name)
 
     def ends(self):
+        self.until(lambda: self.state.job > 0, 5.0)
         self.until(lambda: self.state.state == JobState.IDLE and not self.state.plan_ready)
         return self.state
 

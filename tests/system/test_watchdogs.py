@@ -23,6 +23,7 @@ from push_ros.qos import COMMAND, STREAM
 from push_scenario.scenario import load_scenario
 
 PLACE = np.array([-0.7, 0.0, 0.0])
+PLACES = {"epuck1": PLACE, "box": np.array([0.0, 0.5, 0.0])}
 
 
 @pytest.fixture
@@ -62,7 +63,7 @@ class Stream:
     def send(self, ticks, names=("epuck1", "box")):
         for _ in range(ticks):
             self.tick += 1
-            frame = poses_to_ros(dict.fromkeys(names, PLACE), 0.01 * self.tick)
+            frame = poses_to_ros({n: PLACES[n] for n in names}, 0.01 * self.tick)
             self.poses.publish(frame)
             answered = lambda: (  # noqa: E731
                 self.commands
