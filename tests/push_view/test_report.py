@@ -7,6 +7,7 @@ import pytest
 from PIL import Image
 from rclpy.serialization import serialize_message
 
+from push_model.specs import EnvironmentSpec
 from push_msgs.msg import ControllerStatus, JobState
 from push_record.bag import BagWriter
 from push_record.collisions import Collisions
@@ -27,12 +28,15 @@ TYPES = {
 
 
 def crowd(scenario, robots, items):
-    """A scenario with so many robots and objects."""
+    """A scenario with so many robots and objects, side by side in a hall of its own."""
     robot, box = scenario.robot()[1], scenario.object()[1]
+    places = [np.array([0.3 * (i % 40) - 6.0, 0.3 * (i // 40) - 5.0, 0.0]) for i in range(1600)]
     return replace(
         scenario,
-        robots={f"r{i}": (robot, np.zeros(3)) for i in range(robots)},
-        objects={f"box{i}": (box, np.zeros(3)) for i in range(items)},
+        environment=EnvironmentSpec((16.0, 16.0), resolution=0.05),
+        goals=(),
+        robots={f"r{i}": (robot, places[i]) for i in range(robots)},
+        objects={f"box{i}": (box, places[robots + i]) for i in range(items)},
     )
 
 
@@ -128,7 +132,7 @@ def test_report_of_a_thousand_bodies(scenario, tmp_path):
     random = np.random.default_rng(2)
     many = crowd(scenario, 1000, 1)
     bag = Bag(tmp_path / "bag", many)
-    start = random.uniform((-1.4, -0.9, -3), (1.4, 0.9, 3), (1001, 3))
+    start = random.uniform((-7.8, -7.8, -3), (7.7, 7.7, 3), (1001, 3))
     names = bodies_of(many).names
     for i in range(20):
         poses = start + 0.005 * i
@@ -138,8 +142,15 @@ def test_report_of_a_thousand_bodies(scenario, tmp_path):
     errors = write_report(bag.close(), out, animate=False)
     assert errors["position_error_m"] == pytest.approx(np.hypot(*(poses[1000, :2] - 0.5)))
     pixels = np.asarray(Image.open(out / "trajectory.png").convert("RGB")).astype(int)
-    blue = (pixels[..., 2] - pixels[..., 0] > 40).mean()
-    assert blue > 0.1  # robots all over the map
+    blue = pixels[..., 2] - pixels[..., 0] > 40
+    # robots all over the map: some in each of a hundred parts of the picture's middle
+    rows, columns = (np.linspace(0.2 * n, 0.8 * n, 11).astype(int) for n in blue.shape)
+    parts = [
+        blue[a:b, c:d].any()
+        for a, b in zip(rows[:-1], rows[1:], strict=True)
+        for c, d in zip(columns[:-1], columns[1:], strict=True)
+    ]
+    assert np.mean(parts) > 0.95
 
 
 def test_report_without_an_object_or_a_job(scenario, tmp_path):
