@@ -65,7 +65,7 @@ def case(name: str, target: float, random: np.random.Generator) -> tuple[RobotSp
 
 
 @pytest.mark.parametrize("name", sorted(set(PUSHED) - {"pioneer"}))
-def test_what_is_not_too_heavy_moves_as_commanded_and_what_is_stands_or_creeps(name):
+def test_what_is_not_too_heavy_moves_as_commanded_and_what_is_does_not(name):
     """Masses x heights x frictions; from 1 to 1.25 times the traction is left undecided."""
     random = np.random.default_rng(7)
     for k in range(8):
