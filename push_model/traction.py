@@ -67,9 +67,9 @@ def too_heavy(robot: RobotSpec, item: ObjectSpec) -> str | None:
     """Why a robot cannot push an object alone, or None when it can.
 
     What it does not call too heavy moves as commanded; what needs 1.25 times what there is loses
-    30 % of its way or more. Between the two either may happen: the friction at the bumper depends on how they
-    came together. A robot driven by torques is not judged: its wheels may slip and push all the
-    same, which is what section 2.3 is about.
+    30 % of its way or more. Between the two either may happen: the friction at the bumper depends
+    on how they came together. A robot driven by torques is not judged: its wheels may slip and
+    push all the same, which is what section 2.3 is about.
     """
     if isinstance(robot.drive, TorqueDrive):
         return None
