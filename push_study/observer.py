@@ -27,6 +27,7 @@ class Trace:
     contact_losses: int = 0
     collisions: int = 0
     plan_time: float = 0.0
+    sides: tuple[int, ...] = ()  # of the object, one a push of the last plan
     solve_times: list[float] = field(default_factory=list)
 
 
@@ -115,6 +116,7 @@ class Observer(Node):
 
     def _on_plan(self, message: PushPlan) -> None:
         self.trace.plan_time = float(message.statistics.plan_time)
+        self.trace.sides = tuple(int(s.side) for s in message.segments)
 
     def _on_status(self, message: ControllerStatus) -> None:
         if message.solve_time > 0.0:

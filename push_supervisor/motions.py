@@ -11,12 +11,14 @@ import numpy as np
 from push_model import se2
 from push_model.arrays import Array
 from push_model.occupancy import OccupancyGrid
+from push_model.outlines import overlap
 from push_model.push_segment import PushSegment
 from push_model.trajectory import Trajectory, line
 from push_supervisor.settings import SupervisorSettings
 
 _STEPS = 6  # places along a retreat that are looked at
 _LEAST = 1e-3  # [m] of a retreat that has no room at all
+_SLACK = 5e-3  # [m] by which circles for an outline may ask for too much
 _GIVE = 1e-3  # [m] that a retreat may come nearer to the object, as far as poses can be told
 
 
@@ -41,6 +43,7 @@ def retreat(
     gap: Callable[[Array], float],
     walls: Array,
     settings: SupervisorSettings,
+    depth: float = 0.0,
 ) -> Trajectory:
     """Straight back, or ahead where the object is behind; as far as walls leave room.
 
@@ -48,8 +51,10 @@ def retreat(
     ----------
     gap: [m] between the robot at a pose and the object.
     walls: circles; those that hold the robot now are only not to be driven into any further.
+    depth: [m] further than ``detach_distance``, out of a recess of the object.
     """
-    steps = np.linspace(0.0, settings.detach_distance, _STEPS + 1)
+    way = settings.detach_distance + depth
+    steps = np.linspace(0.0, way, int(np.ceil(_STEPS * way / settings.detach_distance)) + 1)
     nearest = gap(robot)
 
     def reach(sign: float) -> tuple[float, float]:
@@ -67,6 +72,49 @@ def retreat(
     back, ahead = reach(-1.0), reach(1.0)
     sign, way = (1.0, ahead[0]) if ahead[1] > back[1] + _GIVE else (-1.0, back[0])
     return line(robot, sign * max(way, _LEAST), settings.approach_speed, settings.acceleration)
+
+
+def recess(robot: Array, outline: Array, hull: Array, far: float) -> float:
+    """[m] that a robot backs until its outline is clear of an object's convex hull.
+
+    Zero for a robot beside a convex object: at most it touches.
+
+    Parameters
+    ----------
+    robot: in the frame of the object. outline, hull: ``(n, 2)`` of the robot in its own frame, of
+        the object in its. far: [m] at which it is given up.
+    """
+    if not overlap(se2.transform(robot, outline), hull):
+        return 0.0
+    low, high = 0.0, far
+    while high - low > _GIVE:
+        middle = 0.5 * (low + high)
+        there = se2.compose(robot, np.array([-middle, 0.0, 0.0]))
+        if overlap(se2.transform(there, outline), hull):
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def outline_circles(outline: Array, radius: float) -> Array:
+    """Circles about points along an outline that a disc of this radius [m] is to stay clear of.
+
+    Outside all of them the disc does not touch the outline; they ask for up to ``_SLACK`` more
+    room than that, which keeps them few.
+
+    Parameters
+    ----------
+    outline: ``(n, 2)`` [m], closed, in any frame; the circles are in the same.
+    """
+    wide = radius + _SLACK
+    apart = 2.0 * np.sqrt(wide**2 - radius**2)
+    points = []
+    for a, b in zip(outline, np.roll(outline, -1, axis=0), strict=True):
+        parts = max(1, int(np.ceil(np.hypot(*(b - a)) / apart)))
+        points.append(a + np.linspace(0.0, 1.0, parts, endpoint=False)[:, None] * (b - a))
+    at = np.vstack(points)
+    return np.column_stack([at, np.full(len(at), wide)])
 
 
 def wall_circles(grid: OccupancyGrid, body_radius: float, margin: float) -> Array:

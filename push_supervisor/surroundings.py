@@ -12,6 +12,7 @@ from push_model import se2
 from push_model.arrays import Array
 from push_model.jobs import GoalRefused, JobError
 from push_model.occupancy import OccupancyGrid
+from push_model.outlines import convex_hull
 from push_model.push_segment import PushSegment
 from push_model.specs import ObjectSpec, RobotSpec
 from push_model.traction import too_heavy
@@ -43,6 +44,7 @@ class Surroundings:
         self.grid: OccupancyGrid | None = None
         self.walls = _NONE
         self._outline, self._item_outline = robot.outline, item.outline
+        self._hull = convex_hull(self._item_outline)
         self._item_radius = item.geometry.circumradius
         self.settings = settings
 
@@ -108,13 +110,14 @@ class Surroundings:
     def on_the_way(self, item: Array, poses: Mapping[str, Array | None]) -> Array:
         """Circles that the way to a stand-off goes round: the object and the other bodies."""
         radius = self.robot.footprint_radius
-        own = [[item[0], item[1], self._item_radius + radius]]
+        own = motions.outline_circles(se2.transform(item, self._item_outline), radius)
         return np.vstack([own, self.bodies(poses, radius)])
 
     def follow(self, way: Trajectory, item: Array) -> Array:
         """What to keep off on the way to a stand-off: walls and the object."""
-        reach = self._item_radius + self.robot.body_radius + self.settings.obstacle_margin
-        return self._beside(np.vstack([self.walls, [[item[0], item[1], reach]]]), way)
+        reach = self.robot.body_radius + self.settings.obstacle_margin
+        own = motions.outline_circles(se2.transform(item, self._item_outline), reach)
+        return self._beside(np.vstack([self.walls, own]), way)
 
     def approach(self, segment: PushSegment, robot: Array, item: Array) -> tuple[Trajectory, Array]:
         """To contact, keeping off walls."""
@@ -127,7 +130,13 @@ class Surroundings:
 
     def retreat(self, robot: Array, item: Array) -> tuple[Trajectory, Array]:
         """Away from the object, keeping off walls."""
-        way = motions.retreat(robot, lambda pose: self._gap(pose, item), self.walls, self.settings)
+        depth = 0.0
+        if not self.item.geometry.convex:
+            beside, far = se2.between(item, robot), 2.0 * self._item_radius
+            depth = motions.recess(beside, self._outline, self._hull, far)
+        way = motions.retreat(
+            robot, lambda pose: self._gap(pose, item), self.walls, self.settings, depth
+        )
         return way, self._beside(self.walls, way)
 
     def _gap(self, robot: Array, item: Array) -> float:

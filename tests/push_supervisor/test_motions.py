@@ -5,8 +5,10 @@ import pytest
 
 from push_model import CurvatureLimits, PushSegment, line, se2
 from push_model.occupancy import rasterise
+from push_model.outlines import convex_hull, distance, inside, overlap
 from push_model.specs import EnvironmentSpec
 from push_supervisor import SupervisorSettings, motions
+from tests.outlines import CONCAVE, SLIM, U
 
 START = np.array([0.4, -0.2, 0.7])
 
@@ -117,6 +119,36 @@ def test_wall_circles_leave_no_gap_a_robot_could_slip_through(resolution, radius
         inner = np.abs(x) < 1.0 - radius - 0.05
         gap = np.hypot(circles[:, None, 0] - x[inner], circles[:, None, 1] - clear)
         assert (gap - circles[:, 2:]).min() > -1e-6
+
+
+@pytest.mark.parametrize("shape", [*CONCAVE, SLIM])
+@pytest.mark.parametrize("radius", [0.02, 0.06, 0.25])
+def test_circles_of_an_outline_keep_a_disc_off_it_and_ask_for_little_more(shape, radius):
+    outline = np.array(shape)
+    circles = motions.outline_circles(outline, radius)
+    points = np.random.default_rng(0).uniform(-0.5, 0.7, (4000, 2))
+    points = points[~inside(outline, points)]
+    room = (
+        np.hypot(points[:, None, 0] - circles[:, 0], points[:, None, 1] - circles[:, 1])
+        - circles[:, 2]
+    )
+    free = room.min(axis=1) >= 0.0
+    away = distance(outline, points)
+    assert away[free].min() >= radius - 1e-9
+    assert away[~free].max() <= radius + 5e-3 + 1e-9
+    assert 100 < free.sum() < len(points) - 30
+
+
+def test_out_of_a_recess_a_robot_backs_until_it_is_clear_of_the_hull(robot):
+    outline = np.array(U)
+    hull = convex_hull(outline)
+    inner = np.array([0.12, 0.05 + robot.push_distance, -np.pi / 2])  # bumper on the floor of the U
+    depth = motions.recess(inner, robot.outline, hull, 1.0)
+    assert depth == pytest.approx(0.14 - 0.05, abs=2e-3)
+    clear = se2.compose(inner, np.array([-depth, 0.0, 0.0]))
+    assert not overlap(se2.transform(clear, robot.outline), hull)
+    beside = np.array([0.12, -robot.push_distance - 1e-6, np.pi / 2])
+    assert motions.recess(beside, robot.outline, hull, 1.0) == 0.0
 
 
 def test_near_keeps_what_the_motion_can_come_close_to(segment):

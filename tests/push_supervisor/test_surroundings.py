@@ -9,9 +9,11 @@ import pytest
 from push_model import CurvatureLimits, PushSegment, line, se2
 from push_model.jobs import GoalRefused, JobError
 from push_model.occupancy import rasterise
+from push_model.pushable_sides import pushable_sides
 from push_model.specs import BoxSpec, EnvironmentSpec
-from push_supervisor import SupervisorSettings, Surroundings
+from push_supervisor import SupervisorSettings, Surroundings, motions
 from push_supervisor.footprint import gap
+from tests.outlines import CONCAVE, SLIM, U, item_of
 
 SETTINGS = SupervisorSettings()
 OPEN = EnvironmentSpec((3.0, 2.0))
@@ -116,16 +118,47 @@ def test_the_way_goes_round_the_object_and_the_other_bodies(around, robot, box):
     item = np.array([-0.5, 0.0, 0.0])
     poses = {"other": np.array([0.0, 0.5, 1.0]), "crate": None}
     circles = around.on_the_way(item, poses)
-    reach = robot.footprint_radius
-    radius = box.geometry.circumradius
-    assert circles == pytest.approx(
-        np.array([[-0.5, 0.0, radius + reach], [0.0, 0.5, 0.06 + reach]])
-    )
+    own = motions.outline_circles(se2.transform(item, box.outline), robot.footprint_radius)
+    other = np.array([[0.0, 0.5, 0.06 + robot.footprint_radius]])
+    assert circles == pytest.approx(np.vstack([own, other]))
     assert around.bodies(poses) == pytest.approx(np.array([[0.0, 0.5, 0.06]]))
     assert around.bodies({}).shape == (0, 3)
     way = line(np.array([-0.8, 0.0, 0.0]), 0.1, 0.1, 0.1)
     kept = around.follow(way, item)
-    assert kept[-1] == pytest.approx([-0.5, 0.0, radius + robot.body_radius + 0.008])
+    least = robot.body_radius + SETTINGS.obstacle_margin
+    own = motions.outline_circles(se2.transform(item, box.outline), least)
+    assert kept[-len(own) :] == pytest.approx(own)
+
+
+@pytest.mark.parametrize("outline", [*CONCAVE, SLIM])
+def test_at_every_stand_off_of_a_long_or_concave_object_there_is_room(robot, outline):
+    """The object is an obstacle as its outline is, not as a disc about all of it."""
+    item = item_of(outline)
+    around = Surroundings(robot, item, {}, SETTINGS)
+    pose = np.array([0.2, -0.1, 0.7])
+    circles = around.on_the_way(pose, {})
+    sides = pushable_sides(item.geometry, robot)
+    assert len(sides) >= 4
+    for side in sides:
+        back = robot.push_distance + side.depth + 0.06
+        foot = 0.5 * (side.start + side.end) - back * side.inward_normal
+        at = se2.transform(item.mass_pose(pose), foot[None])[0]
+        room = np.hypot(*(circles[:, :2] - at).T) - circles[:, 2]
+        assert room.min() > 0.012
+
+
+def test_a_retreat_from_a_recess_leads_out_of_it(robot):
+    item = item_of(U)
+    around = Surroundings(robot, item, {}, SETTINGS)
+    (side,) = (s for s in pushable_sides(item.geometry, robot) if s.depth > 0.0)
+    middle = 0.5 * (side.start + side.end) - robot.push_distance * side.inward_normal
+    heading = np.arctan2(*side.inward_normal[::-1])
+    pose = np.array([0.3, 0.2, 2.0])
+    contact = se2.compose(item.mass_pose(pose), np.array([*middle, heading]))
+    way, _ = around.retreat(contact, pose)
+    assert -se2.between(contact, way.pose[-1])[0] == pytest.approx(
+        side.depth + SETTINGS.detach_distance, abs=3e-3
+    )
 
 
 def test_a_plan_is_blocked_by_what_it_would_run_into(around, robot, box):
