@@ -19,7 +19,7 @@ from push_bringup.job_result import JobEvent, JobResult
 from push_bringup.launcher import Launcher
 from push_bringup.monitor import Monitor, Pose
 from push_bringup.preparation import check_domain, prepare
-from push_bringup.systems import teams_of
+from push_bringup.systems import MODULES, teams_of
 from push_model.settings import SettingsError
 from push_ros.latched import own_context
 from push_scenario.scenario import Scenario
@@ -44,7 +44,7 @@ class Suite:
         factor: float | None = None,
         respawn: bool = False,
         verbose: bool = False,
-        on_event: Callable[[JobEvent], None] = lambda event: None,
+        on_event: Callable[[JobEvent], None] | None = None,
         context: Any = None,
     ) -> None:
         """Check everything; start nothing yet.
@@ -53,7 +53,8 @@ class Suite:
         ----------
         scenario, system, parameters, namespace, record, factor: see ``prepare``.
         respawn: start a node that died again. verbose: let the nodes write to the terminal.
-        on_event: called with each ``JobEvent`` while a call of this class waits.
+        on_event: called with each ``JobEvent`` while a call of this class waits; the supervisors
+            then log warnings only, not the states that it tells.
         context: of ROS, whose domain the nodes use; one of its own when it is not given.
 
         Raises
@@ -70,7 +71,8 @@ class Suite:
         )
         self.scenario = self.setup.scenario
         self._respawn, self._verbose = respawn, verbose
-        self._on_event = on_event
+        self._on_event = on_event or (lambda event: None)
+        self._quiet = (MODULES["supervisor"],) if on_event else ()
         self._context = context
         self._stack = ExitStack()
         self._launcher: Launcher | None = None
@@ -96,8 +98,12 @@ class Suite:
         check_domain(self.setup.namespace, context)
         folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory("-planar-push")))
         logs = None if self._verbose else folder
+        children = self.setup.write(folder)
+        for child in children:
+            if child.module in self._quiet:
+                child.arguments += ["--log-level", "warn"]
         self._launcher = Launcher(
-            self.setup.write(folder),
+            children,
             self._respawn,
             self._said.append,
             logs,

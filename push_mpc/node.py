@@ -41,7 +41,6 @@ from push_ros.qos import COMMAND, STATUS
 from push_ros.validation import FRAME, InvalidMessage, check_frame, finite, planar_pose
 from push_scenario.scenario import Scenario, load_scenario
 
-_GIVE_UP = 5.0  # [s] without poses until a task is given up
 _TICK = 0.01  # [s] assumed where the time since the last frame is not known
 _FEEDBACK_EVERY = 10  # frames
 _WATCH = 0.05  # [s] wall time between looks at the pose stream
@@ -263,8 +262,8 @@ class ControllerNode(Node):
         self._mode = ControllerStatus.HOLD
         self._reason = f"no valid pose of {missing}"
         self._held += dt
-        if self._held > _GIVE_UP:
-            why = f"{self._reason} for {_GIVE_UP:.0f} s"
+        if self._held > self.tracker.settings.give_up:
+            why = f"{self._reason} for {self._held:.1f} s"
             self._end(FollowTrajectory.Result.POSES_STALE, why)
         if self._ticks % _FEEDBACK_EVERY == 0:
             self._server.feedback(FollowTrajectory.Feedback())
@@ -330,7 +329,7 @@ class ControllerNode(Node):
             return
         self.tracker.halt()
         self._publish_command(0.0, 0.0)
-        if silence > _GIVE_UP:
+        if silence > self.tracker.settings.give_up:
             self._end(FollowTrajectory.Result.POSES_STALE, f"no poses for {silence:.1f} s")
 
     def stop(self) -> None:

@@ -60,6 +60,9 @@ class TrackerSettings:
         0.85, low=0.1, high=1.0, doc="fraction of the stable curvature the controller may use"
     )
     pose_delay: float = bounded(0.0, low=0.0, high=1.0, doc="[s] latency of the pose stream")
+    give_up: float = bounded(
+        5.0, low=0.1, high=600.0, doc="[s] without poses until a task is given up"
+    )
     position_tolerance: float = bounded(0.006, low=1e-4, high=1.0, doc="[m] at the end")
     orientation_tolerance: float = bounded(0.03, low=1e-4, high=3.2, doc="[rad] at the end")
     settle_time: float = bounded(3.0, low=0.0, high=60.0, doc="[s] to reach the tolerance")

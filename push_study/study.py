@@ -1,11 +1,13 @@
 """A study: an experiment's trials, run or gone on with, and what they amount to."""
 
 import csv
+import fcntl
 import importlib
 import json
 import os
 import pkgutil
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -74,27 +76,28 @@ def run_study(name: str, options: StudyOptions) -> dict[str, Any]:
     Raises
     ------
     SettingsError: something is wrong with the options; nothing has been started.
-    FileExistsError: the folder holds something else.
+    FileExistsError: the folder holds something else, or another process is at it.
     """
     what = experiment(name)
     _check(options)
     tasks = what.tasks(options)
     _claim(options.out, {"experiment": name, "seed": options.seed, "revision": revision()})
-    rows = run_trials(
-        what.trial, tasks, options.out / "trials.jsonl", options.scheduler, options.workers
-    )
-    summary = {
-        "experiment": name,
-        "seed": options.seed,
-        "revision": revision(),
-        "requested": len(tasks),
-        "trials": rows,
-        "aggregate": aggregate(rows),
-    }
-    (options.out / "summary.json").write_text(json.dumps(summary, indent=1) + "\n")
-    if rows:
-        _write_table(options.out / "trials.csv", rows)
-    what.conclude(options, tasks, rows)
+    with _alone(options.out):
+        rows = run_trials(
+            what.trial, tasks, options.out / "trials.jsonl", options.scheduler, options.workers
+        )
+        summary = {
+            "experiment": name,
+            "seed": options.seed,
+            "revision": revision(),
+            "requested": len(tasks),
+            "trials": rows,
+            "aggregate": aggregate(rows),
+        }
+        (options.out / "summary.json").write_text(json.dumps(summary, indent=1) + "\n")
+        if rows:
+            _write_table(options.out / "trials.csv", rows)
+        what.conclude(options, tasks, rows)
     return summary
 
 
@@ -138,6 +141,19 @@ def _claim(out: Path, study: dict[str, Any]) -> None:
     if not os.access(out, os.W_OK):
         raise SettingsError(f"{out}: nothing can be written there")
     mark.write_text(json.dumps(study, indent=1) + "\n")
+
+
+@contextmanager
+def _alone(out: Path) -> Iterator[None]:
+    """Nobody else is at the study meanwhile; the system lets go when the process ends."""
+    with (out / "study.json").open() as mark:
+        try:
+            fcntl.flock(mark, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise FileExistsError(
+                f"another process is at the study in {out}; wait for it, or choose another --out"
+            ) from error
+        yield
 
 
 def _write_table(path: Path, rows: list[Row]) -> None:

@@ -1,5 +1,6 @@
 """A whole experiment, small: a scenario given by path, in a map of its own."""
 
+import fcntl
 import json
 import os
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 from planar_push.main import main
 from push_model.settings import SettingsError
 from push_record.bag import read_metadata
+from push_record.revision import revision
 from push_study.cluster import isolated
 from push_study.experiments.single_robot import SingleRobotTask, trial
 from push_study.pool import local_results
@@ -117,6 +119,19 @@ def test_a_folder_that_holds_something_else_is_left_alone(tmp_path, capsys):
     assert main([*words, "--out", str(tmp_path)]) == 2
     assert "no study" in capsys.readouterr().err
     assert [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_two_processes_are_not_at_one_study_at_once(tmp_path, capsys):
+    out = tmp_path / "out"
+    words = ["experiment", "single-robot", "--scenarios", "short", "--out", str(out)]
+    study = {"experiment": "single-robot", "seed": 1, "revision": revision()}
+    out.mkdir()
+    (out / "study.json").write_text(json.dumps(study))
+    with (out / "study.json").open() as mark:
+        fcntl.flock(mark, fcntl.LOCK_EX)
+        assert main(words) == 2
+    assert f"another process is at the study in {out}" in capsys.readouterr().err
+    assert [p.name for p in out.iterdir()] == ["study.json"]
 
 
 def test_a_study_in_which_nothing_succeeds_is_not_complete():
