@@ -6,11 +6,13 @@ from typing import Any
 
 from push_estimation.pose_gate import PoseGateSettings
 from push_model.settings import SettingsError, from_mapping
-from push_mpc import MpcSettings, TrackerSettings
+from push_mpc.controllers import controller_kind
+from push_mpc.settings import ControllerSettings, MpcSettings, TrackerSettings
 from push_planner import PlannerSettings
 from push_scenario.scenario import Scenario
 from push_supervisor import SupervisorSettings
 from sim_bridge.settings import BridgeSettings, MotionCaptureSettings, PhysicsSettings
+from sim_bridge.worlds import world_kind
 
 SECTIONS: dict[str, dict[str, type[Any]]] = {
     "bridge": {
@@ -19,47 +21,67 @@ SECTIONS: dict[str, dict[str, type[Any]]] = {
         "physics": PhysicsSettings,
     },
     "planner": {"": PlannerSettings},
-    "controller": {"mpc": MpcSettings, "tracker": TrackerSettings, "poses": PoseGateSettings},
+    "controller": {
+        "": ControllerSettings,
+        "mpc": MpcSettings,
+        "tracker": TrackerSettings,
+        "poses": PoseGateSettings,
+    },
     "supervisor": {"": SupervisorSettings, "poses": PoseGateSettings},
 }
-"""Node to its settings classes by section; the section "" is the node's own level."""
+"""Node to its settings classes by section; the section "" is the node's own level. Another world
+or another controller has its own in the place of ``physics`` or ``mpc``."""
+
+
+def sections_of(node: str, values: Mapping[str, Any]) -> dict[str, type[Any]]:
+    """The settings classes of a node whose values are these.
+
+    Raises
+    ------
+    SettingsError: a world or a controller that there is not.
+    """
+    sections = dict(SECTIONS[node])
+    if node == "bridge" and "world" in values:
+        sections["physics"] = world_kind(str(values["world"])).settings
+    if node == "controller" and "controller" in values:
+        sections["mpc"] = controller_kind(str(values["controller"])).settings
+    return sections
 
 
 def check_settings(scenario: Scenario) -> None:
     """Raise SettingsError for settings in a scenario that a node would refuse."""
     for node, values in scenario.parameters.items():
-        sections = SECTIONS.get(node)
-        if sections is None:
+        if node not in SECTIONS:
             known = ", ".join(SECTIONS)
             raise SettingsError(
                 f"{scenario.name}.parameters: unknown node '{node}'; expected one of: {known}"
             )
         own = dict(values)
-        for section, cls in sections.items():
+        for section, cls in sections_of(node, values).items():
             if section:
                 from_mapping(cls, own.pop(section, None), f"{scenario.name}.{node}.{section}")
-        if "" in sections:
-            from_mapping(sections[""], own, f"{scenario.name}.{node}")
-        elif own:
-            raise SettingsError(
-                f"{scenario.name}.{node}: unknown key '{next(iter(own))}'; expected one of: "
-                + ", ".join(sections)
-            )
+        from_mapping(SECTIONS[node][""], own, f"{scenario.name}.{node}")
 
 
-def defaults() -> dict[str, dict[str, Any]]:
-    """Every setting of every node, as it is where nobody says otherwise."""
-    result: dict[str, dict[str, Any]] = {}
-    for node, sections in SECTIONS.items():
+def resolved(scenario: Scenario) -> Scenario:
+    """The scenario with every setting of every node written out, defaults included.
+
+    Raises
+    ------
+    SettingsError: see ``check_settings``.
+    """
+    check_settings(scenario)
+    nodes: dict[str, dict[str, Any]] = {}
+    for node in SECTIONS:
         values: dict[str, Any] = {}
-        for section, cls in sections.items():
-            settings = asdict(cls())
+        for section, cls in sections_of(node, scenario.parameters.get(node, {})).items():
+            settings = {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(cls()).items()}
             if section:
                 values[section] = settings
             else:
                 values.update(settings)
-        result[node] = values
-    return result
+        nodes[node] = values
+    return scenario.with_defaults(nodes)
 
 
 def changed(

@@ -8,7 +8,7 @@ from typing import Any
 
 from push_bringup.failures import DomainInUse
 from push_bringup.launcher import Child
-from push_bringup.node_settings import changed, check_settings
+from push_bringup.node_settings import changed, resolved
 from push_bringup.systems import LIVE, MODULES, NodeSpec, nodes_of, recorder
 from push_model.settings import SettingsError
 from push_ros.latched import has_publisher
@@ -65,7 +65,7 @@ def prepare(
     made = changed(made, LIVE, only_missing=True)
     if factor is not None:
         made = made.settings("bridge", real_time_factor=float(factor))
-    check_settings(made)
+    made = resolved(made)
     nodes = nodes_of(system, made, namespace)
     bag = Path(record) if str(record) else None
     if bag is not None:

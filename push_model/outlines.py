@@ -27,6 +27,17 @@ def convex_hull(points: Array) -> Array:
     return np.array([*chain(ordered), *chain(ordered[::-1])])
 
 
+def inset(outline: Array, distance: float) -> Array:
+    """An outline, counter-clockwise, with every edge moved inward [m]."""
+    edge = np.roll(outline, -1, axis=0) - outline
+    normal = np.column_stack([-edge[:, 1], edge[:, 0]]) / np.hypot(*edge.T)[:, None]
+    before = np.roll(normal, 1, axis=0)
+    bisector = normal + before
+    scale = distance / np.maximum(0.5 * (bisector**2).sum(1), 0.2)
+    moved: Array = outline + bisector * scale[:, None]
+    return moved
+
+
 def inside_convex(outline: Array, points: Array, margin: float = 0.0) -> Mask:
     """Which points ``(k, 2)`` lie in a convex outline and over ``margin`` [m] from its edges."""
     edge = np.roll(outline, -1, axis=0) - outline

@@ -22,6 +22,7 @@ from push_mpc import (
     TrajectoryTracker,
     controller_kind,
 )
+from push_mpc.settings import ControllerSettings
 from push_msgs.action import FollowTrajectory
 from push_msgs.msg import ControllerStatus
 from push_ros.actions import GoalServer
@@ -61,14 +62,9 @@ class ControllerNode(Node):
         names = names_of_robot(self, self.robot)
         values = dict(self._scenario.parameters.get("controller", {}))
         sections = {k: values.pop(k, {}) for k in ("mpc", "tracker", "poses")}
-        default = str(values.pop("controller", "ltv"))
-        if values:
-            raise SettingsError(
-                f"controller: unknown key '{next(iter(values))}'; expected controller, mpc, "
-                "tracker or poses"
-            )
+        own = declare_settings(self, ControllerSettings, values, where="controller")
         self._drive = spec.differential
-        self._kind = controller_kind(str(self.declare_parameter("controller", default).value))
+        self._kind = controller_kind(own.controller)
         self._mpc_settings = declare_settings(
             self, self._kind.settings, sections["mpc"], "mpc", "controller.mpc", self._apply_mpc
         )

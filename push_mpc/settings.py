@@ -6,6 +6,13 @@ from push_model.settings import SettingsError, bounded, settings
 
 
 @settings
+class ControllerSettings:
+    """Of the node itself."""
+
+    controller: str = bounded("ltv", doc="which predictive controller, by name")
+
+
+@settings
 class MpcSettings:
     """Names follow section 2.4.5.
 

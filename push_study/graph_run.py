@@ -15,7 +15,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from push_bringup.job_result import JobResult, result_of
 from push_bringup.monitor import Pose
-from push_bringup.node_settings import changed
+from push_bringup.node_settings import changed, resolved
 from push_bringup.suite import scenario_goals
 from push_bringup.systems import LOCKSTEP, NodeSpec, nodes_of, teams_of
 from push_model.arrays import Array
@@ -93,7 +93,7 @@ class LockstepRun:
         self._stack = ExitStack()
         self.spinner: Spinner | None = None
         self.scenario, simulated = (
-            changed(s.settings("bridge", lockstep=True), LOCKSTEP, only_missing=True)
+            resolved(changed(s.settings("bridge", lockstep=True), LOCKSTEP, only_missing=True))
             for s in (scenario, world or scenario)
         )
         specs = nodes_of(system, scenario, namespace)

@@ -12,10 +12,11 @@ import numpy as np
 import pybullet as pb
 
 from push_model.arrays import Array
+from push_model.convex_parts import convex_parts
 from push_model.limit_surface import GRAVITY, uniform_pressure_radius
+from push_model.outlines import inset
 from push_model.specs import ObjectSpec
 from sim_bridge.collision_groups import BODY, SUPPORT, set_group
-from sim_bridge.convex_parts import convex_parts, inset
 
 _CLEARANCE = 0.003  # [m] of the body above the floor
 _FOOT_RADIUS = 0.005  # [m]

@@ -9,7 +9,6 @@ import pytest
 from push_model import se2, uniform_pressure_radius
 from push_model.specs import BoxSpec, EnvironmentSpec, ObjectSpec
 from push_scenario.scenario import scenario_from_mapping
-from sim_bridge.convex_parts import convex_parts
 from sim_bridge.disturbances import Disturbances
 from sim_bridge.pybullet_world import PyBulletWorld
 from sim_bridge.settings import PhysicsSettings
@@ -234,40 +233,8 @@ def test_the_killed_stand_and_the_removed_are_gone_until_the_reset(robot):
         assert world.poses()["e"][0] > 0.015
 
 
-L_SHAPE = [[0, 0], [0.2, 0], [0.2, 0.06], [0.06, 0.06], [0.06, 0.2], [0, 0.2]]
-T_SHAPE = [[0.07, 0], [0.13, 0], [0.13, 0.14], [0.2, 0.14], [0.2, 0.2], [0, 0.2], [0, 0.14],
-           [0.07, 0.14]]  # fmt: skip
 U_SHAPE = [[0, 0], [0.2, 0], [0.2, 0.19], [0.14, 0.19], [0.14, 0.06], [0.06, 0.06], [0.06, 0.2],
            [0, 0.2]]  # fmt: skip
-
-
-def area(points):
-    x, y = np.asarray(points, dtype=float).T
-    return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2.0
-
-
-@pytest.mark.parametrize(("outline", "most"), [(L_SHAPE, 2), (T_SHAPE, 3), (U_SHAPE, 3)])
-def test_concave_outlines_are_cut_into_few_convex_parts(outline, most):
-    parts = convex_parts(np.array(outline, dtype=float))
-    assert sum(map(area, parts)) == pytest.approx(area(outline)) and len(parts) <= most + 1
-    for part in parts:
-        edge = np.roll(part, -1, axis=0) - part
-        turn = edge[:, 0] * np.roll(edge[:, 1], -1) - edge[:, 1] * np.roll(edge[:, 0], -1)
-        assert (turn > -1e-12).all() and area(part) > 0
-
-
-def test_random_star_shapes_keep_their_area_when_cut():
-    random = np.random.default_rng(2)
-    for _ in range(200):
-        n = random.integers(4, 20)
-        angle = np.sort(random.uniform(0, 2 * np.pi, n))
-        if np.diff([*angle, angle[0] + 2 * np.pi]).max() > 3.0:
-            continue
-        outline = random.uniform(0.05, 0.2, n)[:, None] * np.column_stack(
-            [np.cos(angle), np.sin(angle)]
-        )
-        parts = convex_parts(outline)
-        assert sum(map(area, parts)) == pytest.approx(area(outline), rel=1e-9)
 
 
 def test_a_disc_reaches_into_a_concave_object():

@@ -4,7 +4,10 @@ import re
 from pathlib import Path
 
 import pytest
-from rclpy.action import get_action_server_names_and_types_by_node
+from rclpy.action import (
+    get_action_client_names_and_types_by_node,
+    get_action_server_names_and_types_by_node,
+)
 
 from push_ros.process import own_domain
 from push_scenario.scenario import load_scenario
@@ -39,7 +42,7 @@ def names(cell):
 
 @pytest.fixture(scope="module")
 def graph():
-    """Of every node: topics that it hears, topics that it tells, what it serves."""
+    """Of every node: topics that it hears, topics that it tells, what it serves, what it asks."""
     with own_domain(), LockstepRun(load_scenario("short"), quiet=True) as run:
         run.start()
         found = {}
@@ -55,10 +58,13 @@ def graph():
                 if s.startswith(own) and ("parameter" in s or "type_description" in s)
             }
             actions = {t for t, _ in get_action_server_names_and_types_by_node(me, name, space)}
+            asked = {t for t, _ in me.get_client_names_and_types_by_node(name, space)}
+            goals = {t for t, _ in get_action_client_names_and_types_by_node(me, name, space)}
             found[row] = (
                 {t for t in heard if "/_action/" not in t} - OF_ALL,
                 {t for t in told if "/_action/" not in t} - OF_ALL,
                 {s for s in served - parameters if "/_action/" not in s} | actions,
+                {s for s in asked if "/_action/" not in s} | goals,
             )
             assert "/diagnostics" in told, row
         yield found
@@ -69,14 +75,14 @@ def test_every_node_has_a_row_and_no_other():
 
 
 @pytest.mark.parametrize("node", NODES)
-def test_what_a_node_hears_tells_and_serves(graph, node):
+def test_what_a_node_hears_tells_serves_and_asks(graph, node):
     (row,) = [r for r in table("node") if r[0] == node]
     for cell, actual in zip(row[1:], graph[node], strict=True):
         assert names(cell) == actual, node
 
 
 def test_settings_and_their_defaults_exist():
-    from push_mpc.settings import MpcSettings, TrackerSettings
+    from push_mpc.settings import ControllerSettings, MpcSettings, TrackerSettings
     from push_planner import PlannerSettings
     from push_supervisor import SupervisorSettings
     from sim_bridge.settings import BridgeSettings, MotionCaptureSettings
@@ -85,7 +91,7 @@ def test_settings_and_their_defaults_exist():
         "bridge": (BridgeSettings(), {"motion_capture": MotionCaptureSettings()}),
         "planner": (PlannerSettings(), {}),
         "controller": (
-            type("Own", (), {"controller": "ltv"}),
+            ControllerSettings(),
             {"mpc": MpcSettings(), "tracker": TrackerSettings()},
         ),
         "supervisor": (SupervisorSettings(), {}),
