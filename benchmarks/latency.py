@@ -15,8 +15,9 @@ from push_bringup.systems import MODULES, single
 from push_model import line, unicycle_step
 from push_msgs.action import FollowTrajectory
 from push_msgs.msg import Poses
+from push_ros.claims import claim_domain
 from push_ros.conversions import poses_to_ros, trajectory_to_ros
-from push_ros.process import Spinner, claim_domain, prepare_environment
+from push_ros.process import Spinner, prepare_environment
 from push_ros.qos import COMMAND, STREAM
 from push_scenario.scenario import load_scenario
 

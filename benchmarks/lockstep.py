@@ -18,8 +18,9 @@ from rclpy.signals import SignalHandlerOptions
 
 from benchmarks.measure import at_least, at_most
 from push_msgs.msg import Poses, Velocities
+from push_ros.claims import claim_domain
 from push_ros.conversions import twist_to_ros
-from push_ros.process import Spinner, claim_domain, prepare_environment
+from push_ros.process import Spinner, prepare_environment
 from push_ros.qos import COMMAND, STREAM
 from push_scenario.scenario import Scenario, load_scenario, scenario_from_mapping
 from push_study.graph_run import LockstepRun

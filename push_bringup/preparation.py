@@ -11,6 +11,7 @@ from push_bringup.launcher import Child
 from push_bringup.node_settings import changed, resolved
 from push_bringup.systems import LIVE, MODULES, NodeSpec, nodes_of, recorder
 from push_model.settings import SettingsError
+from push_ros.claims import world_is_claimed
 from push_ros.latched import has_publisher
 from push_ros.names import space
 from push_scenario.scenario import Scenario, load_scenario
@@ -86,11 +87,14 @@ def check_bag(folder: Path) -> None:
 
 def check_domain(namespace: str = "", context: Any = None) -> None:
     """Raise DomainInUse when a bridge, or another source of poses, is there already."""
-    if not has_publisher(f"{space(namespace)}poses", _DISCOVERY, context):
-        return
-    domain = os.environ.get("ROS_DOMAIN_ID", "0")
+    domain = os.environ.get("ROS_DOMAIN_ID") or "0"
     if context is not None:
         domain = str(context.get_domain_id())
+    here = space(namespace)
+    if not world_is_claimed(domain, here) and not has_publisher(
+        f"{here}poses", _DISCOVERY, context
+    ):
+        return
     where = f" in namespace {namespace.strip('/')}" if namespace.strip("/") else ""
     raise DomainInUse(
         f"a bridge already runs in domain {domain}{where}; stop it, choose another --namespace, "

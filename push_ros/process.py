@@ -2,16 +2,13 @@
 
 import contextlib
 import ctypes
-import fcntl
-import itertools
 import os
 import signal
 import sys
-import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError
@@ -23,9 +20,6 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from push_model.settings import SettingsError
-
-_claims: dict[int, IO[str]] = {}
-_turns = itertools.count()
 
 
 def prepare_environment(environment: dict[str, str] | None = None) -> dict[str, str]:
@@ -42,51 +36,6 @@ def prepare_environment(environment: dict[str, str] | None = None) -> dict[str, 
 def die_with_parent() -> None:
     """Linux: ask for SIGTERM when the parent process ends, however it ends."""
     ctypes.CDLL(None).prctl(1, signal.SIGTERM)
-
-
-def claim_domain() -> int:
-    """Set ROS_DOMAIN_ID to one that no other run on this machine has claimed; returns it.
-
-    The claim is a locked file, held until it is released or this process ends. Two lockstep runs on
-    one domain would answer each other's frames. A domain that was released is not taken again at
-    once: those who were killed in it are remembered there for a while.
-    """
-    for _ in range(100):
-        domain = 1 + (os.getpid() + next(_turns)) % 100
-        path = Path(tempfile.gettempdir()) / f"planar_push_domain_{domain}.lock"
-        try:
-            file = path.open("a")
-        except OSError:  # somebody else's
-            continue
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            file.close()
-            continue
-        _claims[domain] = file
-        os.environ["ROS_DOMAIN_ID"] = str(domain)
-        return domain
-    raise RuntimeError("all hundred ROS domains for lockstep runs are in use")
-
-
-def release_domain(domain: int) -> None:
-    """Give a claimed domain back."""
-    _claims.pop(domain).close()
-
-
-@contextlib.contextmanager
-def own_domain() -> Iterator[int]:
-    """A domain that nobody else on this machine has, while the block runs."""
-    before = os.environ.get("ROS_DOMAIN_ID")
-    domain = claim_domain()
-    try:
-        yield domain
-    finally:
-        release_domain(domain)
-        if before is None:
-            os.environ.pop("ROS_DOMAIN_ID", None)
-        else:
-            os.environ["ROS_DOMAIN_ID"] = before
 
 
 def heard(node: Node, publisher: Any, state_type: str = "push_msgs/msg/JobState") -> bool:

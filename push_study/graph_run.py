@@ -21,8 +21,9 @@ from push_bringup.systems import LOCKSTEP, NodeSpec, nodes_of, teams_of
 from push_model.arrays import Array
 from push_model.jobs import JobError
 from push_msgs.msg import JobState
+from push_ros.claims import claim_domain
 from push_ros.names import Names, space
-from push_ros.process import Spinner, claim_domain, prepare_environment
+from push_ros.process import Spinner, prepare_environment
 from push_scenario.scenario import Scenario
 from push_study.observer import Observer
 

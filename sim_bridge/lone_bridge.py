@@ -1,11 +1,13 @@
 """Only one bridge in a namespace of a domain: a second would set the clock of the first back."""
 
 import time
+from typing import IO
 
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 
 from push_model.settings import SettingsError
+from push_ros.claims import claim_world
 from push_ros.names import Names
 from push_ros.qos import CLOCK
 
@@ -13,19 +15,27 @@ _GONE = 6.0  # [s] after which one that was killed is forgotten by the graph, se
 _PAUSE = 0.02  # [s] between looks
 
 
-def refuse_second_bridge(node: Node, names: Names, wait: float) -> None:
-    """Look for another bridge for some time [s] of wall time, before publishing anything.
+def refuse_second_bridge(node: Node, names: Names, wait: float) -> IO[str]:
+    """Claim the world, and look for another bridge for some time [s], before publishing anything.
 
-    One that was killed stays in the graph for some seconds: it is waited for until it vanishes. One
+    Returns the claim, to be closed with the bridge. One on this machine is known by its claim. One
+    that was killed stays in the graph for some seconds: it is waited for until it vanishes. One
     that lives is known by its clock.
 
     Raises
     ------
     SettingsError: a bridge already runs here.
     """
+    domain = str(node.context.get_domain_id())
+    where = names.world_space.rstrip("/")
+    inside = f", namespace {where}" if where else ""
+    runs = SettingsError(f"a bridge already runs in domain {domain}{inside}")
+    claim = claim_world(domain, names.world_space)
+    if claim is None:
+        raise runs
     topic = names.world("poses")
     if not _seen(node, topic, time.monotonic() + wait):
-        return
+        return claim
     clock = node.create_subscription(Clock, names.world("clock"), lambda _: None, CLOCK)
     try:
         end = time.monotonic() + _GONE
@@ -33,14 +43,12 @@ def refuse_second_bridge(node: Node, names: Names, wait: float) -> None:
             with clock.handle:
                 ticks = clock.handle.take_message(Clock, False) is not None
             if ticks or time.monotonic() > end:
-                where = names.world_space.rstrip("/")
-                inside = f", namespace {where}" if where else ""
-                raise SettingsError(
-                    f"a bridge already runs in domain {node.context.get_domain_id()}{inside}"
-                )
+                claim.close()
+                raise runs
             time.sleep(_PAUSE)
     finally:
         node.destroy_subscription(clock)
+    return claim
 
 
 def _seen(node: Node, topic: str, end: float) -> bool:

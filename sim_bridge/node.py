@@ -3,7 +3,7 @@
 import math
 import sys
 import time
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from rclpy.clock import Clock, ClockType
@@ -60,8 +60,9 @@ class BridgeNode(Node):
         self._physics = declare_settings(
             self, self._kind.settings, physics, "physics", "bridge.physics"
         )
+        self._claim: IO[str] | None = None
         if autostart:
-            refuse_second_bridge(self, self._names, self.settings.discovery_time)
+            self._claim = refuse_second_bridge(self, self._names, self.settings.discovery_time)
         self._rate = self._capture_settings.rate
         self.period = 1.0 / self._rate
         self._decimation = max(1, round(self._rate / self.settings.tf_rate))
@@ -261,7 +262,9 @@ class BridgeNode(Node):
         }
 
     def destroy_node(self) -> None:
-        """Close the world too."""
+        """Close the world too, and give it free."""
+        if self._claim is not None:
+            self._claim.close()
         if self.world is not None:
             self.world.close()
             self.world = None

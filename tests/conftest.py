@@ -5,7 +5,8 @@ import pytest
 from hypothesis import HealthCheck, settings
 from PIL import Image
 
-from push_ros.process import claim_domain, prepare_environment, release_domain
+from push_ros.claims import claim_domain, release_domain
+from push_ros.process import prepare_environment
 from push_scenario.scenario import config_directory, load_scenario
 
 prepare_environment()

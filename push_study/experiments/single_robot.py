@@ -20,7 +20,7 @@ from push_model.drives import HolonomicDrive
 from push_model.settings import SettingsError
 from push_planner import DistanceField, PlannerSettings, PushScene
 from push_record.recorder import RecorderNode
-from push_ros.process import own_domain
+from push_ros.claims import own_domain
 from push_scenario.scenario import Scenario, load_scenario
 from push_study.graph_run import LockstepRun
 from push_study.observer import Trace, final_errors

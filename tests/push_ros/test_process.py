@@ -2,7 +2,10 @@
 
 import io
 import os
+import subprocess
 import sys
+import tempfile
+from pathlib import Path
 
 import rclpy
 from geometry_msgs.msg import PoseStamped
@@ -11,8 +14,9 @@ from std_msgs.msg import String
 
 from push_msgs.action import MoveObject
 from push_msgs.msg import JobState
+from push_ros.claims import claim_world, own_domain, world_is_claimed
 from push_ros.latched import has_publisher, hear_latched
-from push_ros.process import Spinner, heard, own_domain
+from push_ros.process import Spinner, heard
 from push_ros.qos import COMMAND, LATCHED
 
 
@@ -82,3 +86,31 @@ def test_a_domain_is_given_back(domain, monkeypatch):
     with own_domain():
         pass
     assert "ROS_DOMAIN_ID" not in os.environ
+
+
+def test_the_world_of_a_namespace_is_claimed_by_one_at_a_time(domain):
+    name = str(domain)
+    claim = claim_world(name, "/lab/")
+    assert claim is not None and world_is_claimed(name, "/lab/")
+    assert claim_world(name, "/lab/") is None
+    assert not world_is_claimed(name, "/") and not world_is_claimed(f"{name}0", "/lab/")
+    claim.close()
+    assert not world_is_claimed(name, "/lab/")
+
+
+def test_a_claim_ends_with_its_process_and_one_of_another_user_counts(domain, tmp_path):
+    name = str(domain)
+    code = (
+        "import sys, time; from push_ros.claims import claim_world; "
+        f"c = claim_world({name!r}, '/'); print(c is not None, flush=True); time.sleep(60)"
+    )
+    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout.readline().strip() == "True"
+        path = Path(tempfile.gettempdir()) / f"planar_push_world_{name}-.lock"
+        path.chmod(0o444)  # all that another user may do with it is read
+        assert world_is_claimed(name, "/")
+    finally:
+        process.kill()
+        process.wait()
+    assert not world_is_claimed(name, "/")

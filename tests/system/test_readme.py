@@ -9,7 +9,7 @@ from rclpy.action import (
     get_action_server_names_and_types_by_node,
 )
 
-from push_ros.process import own_domain
+from push_ros.claims import own_domain
 from push_scenario.scenario import load_scenario
 from push_study.graph_run import LockstepRun
 

@@ -11,6 +11,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from push_bringup.failures import DomainInUse, SuiteFailed
 from push_bringup.launcher import Launcher
+from push_bringup.node_settings import SECTIONS
 from push_bringup.suite import Suite
 from push_model.jobs import JobError
 from push_record.bag import read_bag
@@ -65,7 +66,9 @@ def test_a_script_starts_a_suite_and_is_told_how_it_ended(domain, tmp_path, capf
     ]
     contents = load(result.bag)
     assert final_error(contents, contents.jobs["/"]).position < 0.02
-    assert contents.scenario.parameters["planner"] == {"push_speed": 0.06}
+    said = contents.scenario.parameters
+    assert said["planner"]["push_speed"] == 0.06
+    assert set(said) == set(SECTIONS) and said["supervisor"]["wait"] == 3.0  # defaults too
     out, err = capfd.readouterr()
     assert out == "" and err == ""  # silent unless asked
 

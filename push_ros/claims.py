@@ -1,0 +1,92 @@
+"""What only one run on this machine may have: a ROS domain, the world of a namespace.
+
+A claim is a locked file, held until it is released or its process ends, however it ends. It is seen
+at once, while discovery takes its time on a busy machine; for other machines there is only that.
+"""
+
+import contextlib
+import fcntl
+import itertools
+import os
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO
+
+_claims: dict[int, IO[str]] = {}
+_turns = itertools.count()
+
+
+def _locked(name: str) -> IO[str] | None:
+    """The file of a claim; None where somebody else has it."""
+    path = Path(tempfile.gettempdir()) / f"planar_push_{name}.lock"
+    try:
+        file = open(path, opener=_open)  # noqa: SIM115  (it stays open)
+    except OSError:
+        return None
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        file.close()
+        return None
+    return file
+
+
+def _open(path: str, flags: int) -> int:
+    """For reading: that is enough for a lock, also where another user has made the file."""
+    try:
+        return os.open(path, flags)
+    except FileNotFoundError:
+        return os.open(path, flags | os.O_CREAT, 0o644)
+
+
+def claim_world(domain: str, space: str) -> IO[str] | None:
+    """The claim to be the world of a namespace in a domain; to be closed. None: it is taken."""
+    return _locked(f"world_{domain}{space.replace('/', '-')}")
+
+
+def world_is_claimed(domain: str, space: str) -> bool:
+    """Whether a process on this machine is the world of a namespace in a domain."""
+    claim = claim_world(domain, space)
+    if claim is None:
+        return True
+    claim.close()
+    return False
+
+
+def claim_domain() -> int:
+    """Set ROS_DOMAIN_ID to one that no other run on this machine has claimed; returns it.
+
+    The claim is a locked file, held until it is released or this process ends. Two lockstep runs on
+    one domain would answer each other's frames. A domain that was released is not taken again at
+    once: those who were killed in it are remembered there for a while.
+    """
+    for _ in range(100):
+        domain = 1 + (os.getpid() + next(_turns)) % 100
+        file = _locked(f"domain_{domain}")
+        if file is None:
+            continue
+        _claims[domain] = file
+        os.environ["ROS_DOMAIN_ID"] = str(domain)
+        return domain
+    raise RuntimeError("all hundred ROS domains for lockstep runs are in use")
+
+
+def release_domain(domain: int) -> None:
+    """Give a claimed domain back."""
+    _claims.pop(domain).close()
+
+
+@contextlib.contextmanager
+def own_domain() -> Iterator[int]:
+    """A domain that nobody else on this machine has, while the block runs."""
+    before = os.environ.get("ROS_DOMAIN_ID")
+    domain = claim_domain()
+    try:
+        yield domain
+    finally:
+        release_domain(domain)
+        if before is None:
+            os.environ.pop("ROS_DOMAIN_ID", None)
+        else:
+            os.environ["ROS_DOMAIN_ID"] = before
