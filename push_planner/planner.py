@@ -19,7 +19,9 @@ from push_planner.guide_path import GuidePath, NoGuidePath, guide_paths, origin_
 from push_planner.push_search import PushGraph, PushSearch, PushStep, SearchStatistics
 from push_planner.scene import PushScene
 from push_planner.settings import PlannerSettings
+from push_planner.thesis_search import ThesisSearch, poses_on
 
+_Ends = tuple[Array, Array]
 _WORTH = 0.002  # of the cost that a further plan must save
 _NEARBY = 40  # poses about each one that an improvement moves
 _WAYPOINTS = 30  # at most, in the first attempt
@@ -210,6 +212,9 @@ class PushPlanner:
                 PlanError.NO_GUIDE_PATH, "no path from start to goal is wide enough for the object"
             )
         guides.sort(key=lambda g: g.cost)
+        if settings.planner == "thesis":
+            yield from self._as_printed(ends, guides[0], work)
+            return
         best: PushPlan | None = None
         for attempt, count in enumerate(settings.scattered_poses):
             guide = guides[attempt % len(guides)]
@@ -258,6 +263,19 @@ class PushPlanner:
                 best = self._assemble(search, ends[1], best.guide, work)
                 yield Progress("improving", best)
         yield Progress("done", best)
+
+    def _as_printed(self, ends: _Ends, guide: GuidePath, work: _Work) -> Iterator[Progress]:
+        """Layer 2 of the thesis: poses on Gamma alone, and no improvement."""
+        start, goal = (self.scene.item.mass_pose(pose) for pose in ends)
+        poses = poses_on(self.scene, guide).free(self.scene)
+        graph = PushGraph(self.scene, start, goal, poses, np.inf)
+        search = ThesisSearch(graph, work.left)
+        for _ in search.run(work.statistics):
+            yield Progress("push search", None)
+        work.ways_out = work.ways_in = True
+        if search.solution is None:
+            raise PlanningFailed(PlanError.NO_PUSH_SEQUENCE, self._why_not(*ends, work))
+        yield Progress("done", self._assemble(search, ends[1], guide, work))
 
     def _graph(
         self, start: Array, goal: Array, guide: GuidePath, attempt: int, count: int, work: "_Work"
@@ -374,7 +392,7 @@ class PushPlanner:
         )
 
     def _assemble(
-        self, search: PushSearch, goal: Array, guide: GuidePath, work: "_Work"
+        self, search: PushSearch | ThesisSearch, goal: Array, guide: GuidePath, work: "_Work"
     ) -> PushPlan:
         assert search.solution is not None
         segments = tuple(self.segment(step) for step in search.solution)

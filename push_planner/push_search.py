@@ -75,7 +75,7 @@ class PushGraph:
         order = np.argsort(candidates.way, kind="stable")
         self.poses = np.vstack([start, candidates.poses[order], goal])
         first, last = (candidates.way.min(), candidates.way.max()) if len(order) else (0.0, 0.0)
-        way = np.concatenate([[first], candidates.way[order], [last]])
+        way = self.way = np.concatenate([[first], candidates.way[order], [last]])
         self.window = np.column_stack(
             [
                 np.searchsorted(way, way - reach, side="left"),

@@ -1,6 +1,7 @@
 """Settings of the two-layer push planner."""
 
 import math
+from typing import Literal
 
 from push_model.settings import SettingsError, bounded, settings
 
@@ -9,6 +10,9 @@ from push_model.settings import SettingsError, bounded, settings
 class PlannerSettings:
     """Names follow section 2.2; lengths in [m], angles in [rad]."""
 
+    planner: Literal["lazy", "thesis"] = bounded(
+        "lazy", doc="layer 2: lazy A* with improvements, or Algorithms 1 and 2 as printed"
+    )
     length_weight: float = bounded(1.0, low=0.0, high=100.0, doc="lambda_1 of (2.1)")
     clearance_weight: float = bounded(0.05, low=0.0, high=100.0, doc="lambda_2 of (2.1) [m^2]")
     clearance_levels: int = bounded(4, low=1, high=20, doc="thresholds of the bottleneck sweep")
