@@ -14,11 +14,11 @@ import numpy as np
 
 from benchmarks.measure import at_least, at_most, quantiles, thread_times
 from push_model import CurvatureLimits, DifferentialDrive, unicycle_step
-from push_mpc import LtvMpc, MpcSettings, Reference
+from push_mpc import Contact, LtvMpc, MpcSettings, Reference
 from push_qp import ActiveSetBackend, DaqpBackend, OsqpBackend, Qp, QpBackend, QpSolution
 
 DRIVE = DifferentialDrive(0.0205, 0.0265, 6.28)
-LIMITS = CurvatureLimits(-1.8, 1.8)
+LIMITS = Contact(CurvatureLimits(-1.8, 1.8))
 UNBOUNDED = replace(
     MpcSettings(), max_wheel_slack=100.0, max_curvature_slack=100.0, max_obstacle_slack=100.0
 )

@@ -6,6 +6,7 @@ from typing import Protocol
 from push_model.arrays import Array
 from push_model.kinematics import DifferentialDrive
 from push_model.stable_push import CurvatureLimits
+from push_mpc.line_contact import LineContact
 
 
 @dataclass(frozen=True)
@@ -17,6 +18,17 @@ class Reference:
 
     pose: Array
     twist: Array
+
+
+@dataclass(frozen=True)
+class Contact:
+    """What holds the object at the bumper, now.
+
+    limits: stable curvatures. line: where the forces act; None where it is not known.
+    """
+
+    limits: CurvatureLimits
+    line: LineContact | None = None
 
 
 @dataclass(frozen=True)
@@ -60,7 +72,7 @@ class PredictiveController(Protocol):
         ...
 
     def solve(
-        self, error: Array, reference: Reference, limits: CurvatureLimits | None, circles: Array
+        self, error: Array, reference: Reference, contact: Contact | None, circles: Array
     ) -> MpcResult:
         """One step.
 
@@ -68,7 +80,7 @@ class PredictiveController(Protocol):
         ----------
         error: ``(5,)`` of (2.37): e_x, e_y, e_theta, e_v, e_omega.
         reference: over the horizon, first sample now.
-        limits: stable curvatures now, in a push; None when the robot moves alone.
+        contact: in a push; None when the robot moves alone.
         circles: ``(m, 3)`` x, y, least distance of the axle midpoint; m <= max_obstacles.
         """
         ...

@@ -6,9 +6,10 @@ from typing import Any
 
 from push_model.kinematics import DifferentialDrive
 from push_model.settings import SettingsError
+from push_mpc.contact_force_mpc import ContactForceMpc
 from push_mpc.controller import PredictiveController
 from push_mpc.ltv_mpc import LtvMpc
-from push_mpc.settings import MpcSettings
+from push_mpc.settings import ContactForceSettings, MpcSettings
 
 
 @dataclass(frozen=True)
@@ -21,6 +22,7 @@ class ControllerKind:
 
 CONTROLLERS: dict[str, ControllerKind] = {
     "ltv": ControllerKind(MpcSettings, LtvMpc),
+    "contact_force": ControllerKind(ContactForceSettings, ContactForceMpc),
 }
 
 

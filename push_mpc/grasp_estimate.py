@@ -45,6 +45,11 @@ class GraspEstimate:
         return float(self.pose[1] - self.nominal[1])
 
     @property
+    def away(self) -> tuple[float, float]:
+        """[m] by which the object sits ahead and to the left of its nominal place."""
+        return float(self.pose[0] - self.nominal[0]), self.offset
+
+    @property
     def apart(self) -> tuple[float, float, float]:
         """Ahead of its place [m], aside of it (absolute) [m], turned against it (absolute)."""
         away = self.pose - self.nominal

@@ -8,7 +8,8 @@ import numpy as np
 from push_model.arrays import Array
 from push_model.kinematics import DifferentialDrive
 from push_model.stable_push import CurvatureLimits
-from push_mpc.controller import MpcResult, Reference
+from push_mpc.controller import Contact, MpcResult, Reference
+from push_mpc.line_contact import LineContact
 from push_mpc.prediction import OUTPUTS, SLACKS, SOFTENED, condense, constant_rows, tick_rows
 from push_mpc.settings import MpcSettings
 from push_qp import Qp, QpBackend, backend
@@ -53,7 +54,8 @@ class LtvMpc:
         p = self.settings.horizon
         still = Reference(np.zeros((p + 1, 3)), np.zeros((p + 1, 3)))
         circles = np.array([[1.0, 0.0, 0.5]])[: self.settings.max_obstacles]
-        self.solve(np.full(5, 1e-3), still, CurvatureLimits(-1.0, 1.0), circles)
+        line = LineContact(0.05, -0.03, 0.03, np.array([0.1, 0.0]), 0.2, 0.03, 0.07)
+        self.solve(np.full(5, 1e-3), still, Contact(CurvatureLimits(-1.0, 1.0), line), circles)
         self.solve(np.full(5, 1e-3), still, None, np.zeros((0, 3)))
         self.reset()
 
@@ -86,7 +88,7 @@ class LtvMpc:
         self._solver.reset()
 
     def solve(
-        self, error: Array, reference: Reference, limits: CurvatureLimits | None, circles: Array
+        self, error: Array, reference: Reference, contact: Contact | None, circles: Array
     ) -> MpcResult:
         """See PredictiveController.
 
@@ -99,17 +101,18 @@ class LtvMpc:
         total = error.sum() + reference.pose.sum() + reference.twist.sum() + circles.sum()
         if not math.isfinite(total):
             return self._failed("input is not finite", started)
-        result = self._solver.solve(self.programme(error, reference, limits, circles))
+        result = self._solver.solve(self.programme(error, reference, contact, circles))
         if not result.solved:
             return self._failed(result.status, started)
         p = self.settings.horizon
         u = result.z[: 2 * p].reshape(p, 2)
-        part = result.z[2 * p :] / self._max_slack
+        slack = result.z[-SLACKS:]
+        part = slack / self._max_slack
         worst = int(part.argmax())
         if part[worst] > 1.0:
             kind, unit = SOFTENED[worst]
             return self._failed(
-                f"{kind} violated by {result.z[2 * p + worst]:.3g} {unit}, at most "
+                f"{kind} violated by {slack[worst]:.3g} {unit}, at most "
                 f"{self._max_slack[worst]:g} {unit} is tolerated",
                 started,
             )
@@ -122,7 +125,7 @@ class LtvMpc:
         )
 
     def programme(
-        self, error: Array, reference: Reference, limits: CurvatureLimits | None, circles: Array
+        self, error: Array, reference: Reference, contact: Contact | None, circles: Array
     ) -> Qp:
         """The quadratic programme of this step, linearised about the previous solution.
 
@@ -148,6 +151,7 @@ class LtvMpc:
             qp.g,
             self._rollout,
         )
+        limits = None if contact is None else contact.limits
         low, high = (0.0, 0.0) if limits is None else (limits.minimum, limits.maximum)
         tick_rows(
             twist,

@@ -22,6 +22,7 @@ from push_mpc import (
     TrajectoryTracker,
     controller_kind,
 )
+from push_mpc.line_contact import line_contact
 from push_mpc.settings import ControllerSettings
 from push_msgs.action import FollowTrajectory
 from push_msgs.msg import ControllerStatus
@@ -63,7 +64,7 @@ class ControllerNode(Node):
         values = dict(self._scenario.parameters.get("controller", {}))
         sections = {k: values.pop(k, {}) for k in ("mpc", "tracker", "poses")}
         own = declare_settings(self, ControllerSettings, values, where="controller")
-        self._drive = spec.differential
+        self._spec, self._drive = spec, spec.differential
         self._kind = controller_kind(own.controller)
         self._mpc_settings = declare_settings(
             self, self._kind.settings, sections["mpc"], "mpc", "controller.mpc", self._apply_mpc
@@ -156,7 +157,10 @@ class ControllerNode(Node):
         if request.mode == FollowTrajectory.Goal.PUSH:
             if not request.object:
                 raise InvalidMessage("a push needs its object")
-            push = Push(planar_pose(request.contact, "the contact"), limits_from_ros(request))
+            grasp = planar_pose(request.contact, "the contact")
+            item = self._scenario.object(request.object)[1]
+            line = line_contact(self._spec, item, grasp)
+            push = Push(grasp, limits_from_ros(request), line)
         elif request.mode != FollowTrajectory.Goal.MOVE:
             raise InvalidMessage(f"unknown mode {request.mode}")
         if min(tolerances) < 0.0:

@@ -60,6 +60,14 @@ class MpcSettings:
 
 
 @settings
+class ContactForceSettings(MpcSettings):
+    """Of the controller with contact forces, sections 2.4.5-2.4.6."""
+
+    force_weight: float = bounded(0.001, low=1e-6, high=1e3, doc="R_u of each contact force")
+    constraint: bool = bounded(True, doc="whether (2.53) is asked for; without it for comparison")
+
+
+@settings
 class TrackerSettings:
     """When a trajectory is done, and when it has gone wrong."""
 

@@ -7,6 +7,7 @@ from push_model.arrays import Array
 from push_model.stable_push import CurvatureLimits
 from push_model.trajectory import Trajectory
 from push_mpc.controller import MpcResult
+from push_mpc.line_contact import LineContact
 
 
 class TrackError(IntEnum):
@@ -26,11 +27,13 @@ class TrackError(IntEnum):
 class Push:
     """What a push needs beside its trajectory.
 
-    grasp: ``(3,)`` nominal pose of the object in the robot frame; limits: stable curvatures for it.
+    grasp: ``(3,)`` nominal pose of the object in the robot frame; limits: stable curvatures for it;
+    line: where the bumper touches it; None where that is not known, or on no line.
     """
 
     grasp: Array
     limits: CurvatureLimits
+    line: LineContact | None = None
 
 
 @dataclass(frozen=True)

@@ -16,15 +16,15 @@ import numpy as np
 
 from push_model import se2
 from push_model.arrays import Array
-from push_model.stable_push import CurvatureLimits, shifted_limits
+from push_model.stable_push import shifted_limits
 from push_mpc.checks import EndCheck, FailureCheck
 from push_mpc.command import Command
-from push_mpc.controller import MpcResult, PredictiveController, Reference
+from push_mpc.controller import Contact, MpcResult, PredictiveController, Reference
 from push_mpc.dead_reckoning import DeadReckoning
 from push_mpc.grasp_estimate import GraspEstimate, distance
 from push_mpc.reference_clock import ReferenceClock
 from push_mpc.settings import TrackerSettings
-from push_mpc.task import Task, Tick, TrackError
+from push_mpc.task import Push, Task, Tick, TrackError
 
 _NO_CIRCLES = np.zeros((0, 3))
 _REACH = 1.5  # of the way that the horizon covers at full speed: nothing farther can bind
@@ -131,13 +131,13 @@ class TrajectoryTracker:
         robot = self._reckoning.now(at_frame)
         self._reckoning.forget(age)
         seen = None if item is None else se2.between(at_frame, item)
-        grasp, limits = self._grasp, None
+        grasp, contact = self._grasp, None
         if grasp is not None:
             grasp.update(dt, seen)
             item = se2.compose(robot, grasp.pose if seen is None else seen)
         if task.push is not None and grasp is not None:
-            trusted = task.push.limits.scaled(self.settings.friction_trust)
-            limits = shifted_limits(trusted, grasp.offset)
+            contact = self._contact(task.push, grasp)
+        limits = None if contact is None else contact.limits
         self._clock.advance(dt, self._lag)
         reference = self._clock.reference(
             self.controller.horizon,
@@ -163,7 +163,7 @@ class TrajectoryTracker:
         if finished:
             self.stop()
         else:
-            solve = self._solve(error, reference, limits, self._nearest(task, room))
+            solve = self._solve(error, reference, contact, self._nearest(task, room))
             self._command.apply(solve, dt, limits)
             if self._command.given_up:
                 finished, code, message = True, TrackError.SOLVER_FAILED, solve.reason
@@ -189,16 +189,24 @@ class TrajectoryTracker:
             0.0 if grasp is None else grasp.offset,
         )
 
+    def _contact(self, push: Push, grasp: GraspEstimate) -> Contact:
+        """The object where it is, its friction only trusted in part."""
+        trust = self.settings.friction_trust
+        limits = shifted_limits(push.limits.scaled(trust), grasp.offset)
+        if push.line is None:
+            return Contact(limits)
+        return Contact(limits, push.line.trusted(trust).moved(*grasp.away))
+
     def _solve(
         self,
         error: Array,
         reference: Reference,
-        limits: CurvatureLimits | None,
+        contact: Contact | None,
         circles: Array,
     ) -> MpcResult:
         """Solve; an answer after the deadline is as bad as none."""
         started = time.perf_counter()
-        solve = self.controller.solve(error, reference, limits, circles)
+        solve = self.controller.solve(error, reference, contact, circles)
         late = time.perf_counter() - started
         if solve.solved and 0.0 < self.settings.deadline < late:
             return replace(solve, solved=False, late=True, reason=f"late: {1e3 * late:.1f} ms")

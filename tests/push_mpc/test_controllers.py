@@ -32,7 +32,7 @@ class GainController:
     def __init__(self, settings, drive):
         self.settings, self.drive = settings, drive
 
-    def solve(self, error, reference, limits, circles):
+    def solve(self, error, reference, contact, circles):
         k = self.settings.gain
         turn = -k * (4.0 * k * error[1] + 2.0 * k * error[2] + error[4])
         return MpcResult((-k * (k * error[0] + error[3]), turn), True, 0.0, 0.0, "")
@@ -70,5 +70,5 @@ def test_every_controller_offers_what_the_tracker_asks_for():
 
 
 def test_an_unknown_controller_is_refused_with_those_that_there_are():
-    with pytest.raises(SettingsError, match="unknown controller 'pid'; expected one of: ltv"):
+    with pytest.raises(SettingsError, match="'pid'; expected one of: contact_force, ltv"):
         controller_kind("pid")

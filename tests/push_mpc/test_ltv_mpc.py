@@ -6,11 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from push_model import CurvatureLimits, DifferentialDrive
-from push_mpc import LtvMpc, MpcSettings, Reference
+from push_mpc import Contact, LtvMpc, MpcSettings, Reference
 from push_qp import DaqpBackend, QpSolution
 
 DRIVE = DifferentialDrive(0.0205, 0.0265, 6.28)
-LIMITS = CurvatureLimits(-2.0, 2.0)
+LIMITS = Contact(CurvatureLimits(-2.0, 2.0))
 NONE = np.zeros((0, 3))
 
 
@@ -112,7 +112,7 @@ def test_a_robot_deep_inside_a_circle_is_not_solved_at_the_default_settings(seed
     ("kind", "limits", "circles", "error"),
     [
         ("wheel speed", None, NONE, [0.0, 0.0, 0.0, 0.2, 0.0]),
-        ("stable curvature", CurvatureLimits(-1.0, 1.0), NONE, [0.0, 0.0, 0.0, 0.0, 1.5]),
+        ("stable curvature", Contact(CurvatureLimits(-1.0, 1.0)), NONE, [0.0, 0.0, 0.0, 0.0, 1.5]),
         ("obstacle", None, np.array([[0.05, 0.0, 0.08]]), [0.0] * 5),
     ],
 )
