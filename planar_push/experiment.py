@@ -13,6 +13,9 @@ def add_words(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scenarios", default="", help="comma-separated; the experiment's own")
     parser.add_argument("--trials", type=whole(1), default=5, help="of each scenario")
     parser.add_argument("--seed", type=whole(0), default=1, help="of the first trial")
+    parser.add_argument(
+        "--uncertainty", default="mild", help="of the world: none, mild or hard (docs/results.md)"
+    )
     parser.add_argument("--out", default="", help="folder; one that has the beginning is gone on")
     parser.add_argument("--scheduler", default="", help="address of a Dask scheduler")
     parser.add_argument("--workers", type=whole(0), default=0, help="processes here; 0: one a core")
@@ -31,6 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
         Path(out),
         arguments.scheduler,
         arguments.workers,
+        arguments.uncertainty,
     )
     summary = run_study(arguments.name, options)
     print(f"\n{out}/summary.json")

@@ -18,6 +18,7 @@ from push_study import experiments
 from push_study.cluster import check_cluster
 from push_study.summary import aggregate
 from push_study.trials import Row, run_trials
+from push_study.uncertainty import uncertainty
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,7 @@ class StudyOptions:
     """scenarios: names or paths. trials: of each. seed: of the first trial; the next has the next.
 
     scheduler: address of a Dask scheduler; empty for local processes. workers: 0 for one a core.
+    uncertainty: name of how far the world is from what is believed.
     """
 
     scenarios: tuple[str, ...]
@@ -33,6 +35,7 @@ class StudyOptions:
     out: Path
     scheduler: str = ""
     workers: int = 0
+    uncertainty: str = "mild"
 
 
 class Experiment(Protocol):
@@ -81,7 +84,8 @@ def run_study(name: str, options: StudyOptions) -> dict[str, Any]:
     what = experiment(name)
     _check(options)
     tasks = what.tasks(options)
-    _claim(options.out, {"experiment": name, "seed": options.seed, "revision": revision()})
+    mark = {"experiment": name, "seed": options.seed, "uncertainty": options.uncertainty}
+    _claim(options.out, mark | {"revision": revision()})
     with _alone(options.out):
         rows = run_trials(
             what.trial, tasks, options.out / "trials.jsonl", options.scheduler, options.workers
@@ -89,6 +93,7 @@ def run_study(name: str, options: StudyOptions) -> dict[str, Any]:
         summary = {
             "experiment": name,
             "seed": options.seed,
+            "uncertainty": options.uncertainty,
             "revision": revision(),
             "requested": len(tasks),
             "trials": rows,
@@ -119,6 +124,7 @@ def _check(options: StudyOptions) -> None:
         raise SettingsError("scenarios: expected names or paths, with commas between them")
     if len(set(stems)) < len(stems):
         raise SettingsError(f"scenarios: each once, and names that differ; got {', '.join(stems)}")
+    uncertainty(options.uncertainty)
     if options.scheduler:
         check_cluster()
 

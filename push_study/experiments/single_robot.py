@@ -3,7 +3,7 @@
 import hashlib
 import shutil
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,6 @@ import numpy as np
 
 from push_model import se2
 from push_model.arrays import Array
-from push_model.drives import HolonomicDrive
 from push_model.settings import SettingsError
 from push_planner import DistanceField, PlannerSettings, PushScene
 from push_record.recorder import RecorderNode
@@ -27,11 +26,12 @@ from push_study.observer import Trace, final_errors
 from push_study.pool import Row
 from push_study.study import StudyOptions
 from push_study.thesis import TABLE_2_1
+from push_study.uncertainty import uncertainty
 from push_view.bodies import bodies_of
 from push_view.drawing import draw_map
 from push_view.report import write_report
 
-SCENARIOS = ("env1-target1",)
+SCENARIOS = tuple(f"env{e}-target{t}" for e in (1, 2, 3) for t in (1, 2, 3))
 """Where none are named."""
 
 SUCCESS_POSITION = 0.02
@@ -42,19 +42,13 @@ SUCCESS_ORIENTATION = 0.1
 
 @dataclass(frozen=True)
 class SingleRobotTask:
-    """One trial. Noise in [m], [rad], [Hz], [s]; spread: relative, of every friction.
-
-    digest: of the scenario's text, so that a changed one is another task.
-    """
+    """One trial. uncertainty: its name. digest: of the scenario's text, so that a changed one is
+    another task."""
 
     scenario: str
     seed: int
     out: str
-    position_noise: float = 2e-4
-    orientation_noise: float = 0.0017453
-    rate: float = 100.0
-    latency: float = 0.01
-    spread: float = 0.2
+    uncertainty: str = "mild"
     record: bool = False
     digest: str = ""
 
@@ -62,42 +56,6 @@ class SingleRobotTask:
     def trace_file(self) -> Path:
         """Where the trial leaves its trace; a scenario may be named by a path."""
         return Path(self.out) / f"trace-{Path(self.scenario).stem}-{self.seed}.npz"
-
-
-def draw_world(task: SingleRobotTask) -> tuple[Scenario, Scenario, Row]:
-    """What the controller believes, what the world is, and the drawn values."""
-    believed = load_scenario(task.scenario)
-    believed = believed.settings(
-        "bridge",
-        seed=task.seed,
-        motion_capture__position_noise=task.position_noise,
-        motion_capture__orientation_noise=task.orientation_noise,
-        motion_capture__rate=task.rate,
-        motion_capture__latency=task.latency,
-    ).settings("controller", tracker__pose_delay=task.latency)
-    random = np.random.default_rng(task.seed)
-    objects = {}
-    drawn: Row = {}
-    for name, (spec, start) in believed.objects.items():
-        floor, contact = random.uniform(1.0 - task.spread, 1.0 + task.spread, 2)
-        changed = replace(
-            spec,
-            floor_friction=spec.floor_friction * float(floor),
-            contact_friction=spec.contact_friction * float(contact),
-        )
-        objects[name] = (changed, start)
-        drawn[f"{name}_floor_friction"] = changed.floor_friction
-        drawn[f"{name}_contact_friction"] = changed.contact_friction
-    robots = {}
-    for name, (robot, start) in believed.robots.items():
-        grip = float(random.uniform(1.0 - task.spread, 1.0 + task.spread))
-        drive = robot.drive
-        if isinstance(drive, HolonomicDrive):
-            raise SettingsError(f"scenario '{task.scenario}': {name} has no wheels")
-        drive = replace(drive, wheel_friction=drive.wheel_friction * grip)
-        robots[name] = (replace(robot, drive=drive), start)
-        drawn[f"{name}_wheel_friction"] = drive.wheel_friction
-    return believed, replace(believed, objects=objects, robots=robots), drawn
 
 
 def min_clearance(scenario: Scenario, trace: Trace) -> float:
@@ -118,16 +76,22 @@ def min_clearance(scenario: Scenario, trace: Trace) -> float:
 def tasks(options: StudyOptions) -> list[SingleRobotTask]:
     """One a scenario and seed; the first is recorded."""
     digests = {}
+    level = uncertainty(options.uncertainty)
     for name in options.scenarios:
         scenario = load_scenario(name)
         if scenario.goal is None:
             raise SettingsError(f"scenario '{name}' has no goal")
+        try:
+            level.draw(scenario, options.seed)
+        except SettingsError as error:
+            raise SettingsError(f"scenario '{name}': {error}") from None
         digests[name] = hashlib.sha256(scenario.text.encode()).hexdigest()[:16]
     return [
         SingleRobotTask(
             name,
             options.seed + i,
             str(options.out),
+            options.uncertainty,
             record=(i == 0 and j == 0),
             digest=digests[name],
         )
@@ -143,7 +107,8 @@ def trial(task: SingleRobotTask) -> Row:
 
 
 def _push(task: SingleRobotTask) -> Row:
-    believed, world, drawn = draw_world(task)
+    level = uncertainty(task.uncertainty)
+    believed, world, drawn = level.draw(load_scenario(task.scenario), task.seed)
     if believed.goal is None:
         raise ValueError(f"scenario '{task.scenario}' has no goal")
     folder = Path(task.out)

@@ -95,6 +95,7 @@ def test_a_trial_gives_its_domain_and_its_context_back(tmp_path, monkeypatch):
         (["--scenarios", "short,atlantis"], "atlantis"),
         (["--scenarios", "short,short"], "each once"),
         (["--scheduler", "tcp://nowhere:1"], "Dask"),
+        (["--uncertainty", "much"], "expected one of none, mild, hard"),
     ],
 )
 def test_wrong_words_are_refused_before_anything_starts(tmp_path, capsys, words, what):
@@ -124,7 +125,8 @@ def test_a_folder_that_holds_something_else_is_left_alone(tmp_path, capsys):
 def test_two_processes_are_not_at_one_study_at_once(tmp_path, capsys):
     out = tmp_path / "out"
     words = ["experiment", "single-robot", "--scenarios", "short", "--out", str(out)]
-    study = {"experiment": "single-robot", "seed": 1, "revision": revision()}
+    study = {"experiment": "single-robot", "seed": 1, "uncertainty": "mild"}
+    study["revision"] = revision()
     out.mkdir()
     (out / "study.json").write_text(json.dumps(study))
     with (out / "study.json").open() as mark:

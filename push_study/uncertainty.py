@@ -1,0 +1,121 @@
+"""How far the world of a trial is from what planner, controller and supervisor believe."""
+
+import zlib
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from push_model.drives import HolonomicDrive
+from push_model.settings import SettingsError
+from push_model.specs import ObjectSpec, RobotSpec
+from push_scenario.scenario import Scenario
+from push_study.pool import Row
+
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Noise of poses, and what is drawn for the world.
+
+    position_noise [m], orientation_noise [rad]: standard deviation. rate [Hz] of the poses.
+    latency: [s] drawn from; believed_latency: [s] what the controller makes good, the drawn one
+    when None. spread: relative, of frictions. contact_friction: drawn from instead, where given.
+    com: [m] up to which the centre of mass is off. own_draws: other ones for each scenario.
+    """
+
+    position_noise: float = 2e-4
+    orientation_noise: float = 0.0017453
+    rate: float = 100.0
+    latency: Range = (0.01, 0.01)
+    believed_latency: float | None = None
+    spread: float = 0.2
+    contact_friction: Range | None = None
+    com: float = 0.0
+    own_draws: bool = False
+
+    def draw(self, believed: Scenario, seed: int) -> tuple[Scenario, Scenario, Row]:
+        """What is believed, with the motion capture of this trial; the world; the drawn values.
+
+        Raises
+        ------
+        SettingsError: a robot of the scenario has no wheels.
+        """
+        own = [zlib.crc32(believed.name.encode())] if self.own_draws else []
+        random = np.random.default_rng([seed, *own] if own else seed)
+        low, high = self.latency
+        latency = low if low == high else float(random.uniform(low, high))
+        known = latency if self.believed_latency is None else self.believed_latency
+        believed = believed.settings(
+            "bridge",
+            seed=seed,
+            motion_capture__position_noise=self.position_noise,
+            motion_capture__orientation_noise=self.orientation_noise,
+            motion_capture__rate=self.rate,
+            motion_capture__latency=latency,
+        ).settings("controller", tracker__pose_delay=known)
+        drawn: Row = {} if low == high else {"latency_s": latency}
+        objects = {}
+        for name, (item, start) in believed.objects.items():
+            objects[name] = (self._item(name, item, random, drawn), start)
+        robots = {}
+        for name, (robot, start) in believed.robots.items():
+            robots[name] = (self._robot(name, robot, random, drawn), start)
+        return believed, replace(believed, objects=objects, robots=robots), drawn
+
+    def _factor(self, random: np.random.Generator) -> float:
+        return float(random.uniform(1.0 - self.spread, 1.0 + self.spread))
+
+    def _item(
+        self, name: str, item: ObjectSpec, random: np.random.Generator, drawn: Row
+    ) -> ObjectSpec:
+        floor = item.floor_friction * self._factor(random)
+        contact = item.contact_friction * self._factor(random)
+        if self.contact_friction is not None:
+            contact = float(random.uniform(*self.contact_friction))
+        changed = replace(item, floor_friction=floor, contact_friction=contact)
+        drawn[f"{name}_floor_friction"] = floor
+        drawn[f"{name}_contact_friction"] = contact
+        if self.com > 0.0:
+            angle, away = random.uniform(-np.pi, np.pi), self.com * np.sqrt(random.uniform())
+            x, y = item.com[0] + away * np.cos(angle), item.com[1] + away * np.sin(angle)
+            changed = replace(changed, com=(float(x), float(y)))
+            drawn[f"{name}_com_x_m"], drawn[f"{name}_com_y_m"] = float(x), float(y)
+        return changed
+
+    def _robot(
+        self, name: str, robot: RobotSpec, random: np.random.Generator, drawn: Row
+    ) -> RobotSpec:
+        grip, drive = self._factor(random), robot.drive
+        if isinstance(drive, HolonomicDrive):
+            raise SettingsError(f"{name} has no wheels")
+        drive = replace(drive, wheel_friction=drive.wheel_friction * grip)
+        drawn[f"{name}_wheel_friction"] = drive.wheel_friction
+        return replace(robot, drive=drive)
+
+
+UNCERTAINTIES = {
+    "none": Uncertainty(0.0, 0.0, 100.0, (0.0, 0.0), spread=0.0),
+    "mild": Uncertainty(),
+    # A bumper whose friction is a guess, a box whose load is not centred, a motion capture of half
+    # the rate whose latency is known to 20 ms.
+    "hard": Uncertainty(
+        position_noise=1e-3,
+        orientation_noise=float(np.deg2rad(0.5)),
+        rate=60.0,
+        latency=(0.02, 0.06),
+        believed_latency=0.04,
+        contact_friction=(0.1, 0.4),
+        com=0.01,
+        own_draws=True,
+    ),
+}
+"""By name, as ``--uncertainty`` takes them."""
+
+
+def uncertainty(name: str) -> Uncertainty:
+    """The uncertainty of a name; raises SettingsError where there is none."""
+    if name not in UNCERTAINTIES:
+        known = ", ".join(UNCERTAINTIES)
+        raise SettingsError(f"uncertainty: expected one of {known}, got '{name}'")
+    return UNCERTAINTIES[name]

@@ -1,0 +1,66 @@
+"""What is drawn for the world of a trial, and what nobody is told."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from push_model.settings import SettingsError
+from push_scenario.scenario import load_scenario
+from push_study.uncertainty import UNCERTAINTIES, uncertainty
+
+
+def drawn(level, name="short", seeds=range(200)):
+    scenario = load_scenario(name)
+    return [uncertainty(level).draw(scenario, seed) for seed in seeds]
+
+
+def test_hard_draws_fill_their_ranges_and_nobody_believes_them():
+    rows = drawn("hard")
+    mu = np.array([r["box_contact_friction"] for _, _, r in rows])
+    com = np.array([[r["box_com_x_m"], r["box_com_y_m"]] for _, _, r in rows])
+    latency = np.array([r["latency_s"] for _, _, r in rows])
+    assert 0.1 <= mu.min() < 0.12 and 0.38 < mu.max() <= 0.4
+    away = np.hypot(*com.T)
+    assert away.max() <= 0.01 and away.max() > 0.0095 and abs(com.mean()) < 0.001
+    assert 0.02 <= latency.min() < 0.023 and 0.057 < latency.max() <= 0.06
+    for believed, world, row in rows[:20]:
+        item, real = believed.object()[1], world.object()[1]
+        assert item == load_scenario("short").object()[1]
+        assert real.contact_friction == row["box_contact_friction"]
+        assert real.com == (row["box_com_x_m"], row["box_com_y_m"]) and item.com == (0.0, 0.0)
+        controller, bridge = (believed.parameters[n] for n in ("controller", "bridge"))
+        assert controller["tracker"]["pose_delay"] == 0.04
+        capture = bridge["motion_capture"]
+        assert capture["latency"] == row["latency_s"] and capture["rate"] == 60.0
+        assert capture["position_noise"] == 1e-3
+        assert capture["orientation_noise"] == pytest.approx(0.5 * np.pi / 180)
+
+
+def test_own_draws_for_each_scenario_only_where_they_are_hard():
+    def friction(level, name):
+        return drawn(level, name, [3])[0][2]["box_contact_friction"]
+
+    assert friction("hard", "env1-target1") != friction("hard", "env1-target2")
+    assert friction("mild", "env1-target1") == friction("mild", "env1-target2")
+
+
+def test_mild_keeps_friction_within_a_fifth_and_tells_the_latency():
+    for believed, world, row in drawn("mild"):
+        factor = row["box_contact_friction"] / believed.object()[1].contact_friction
+        assert 0.8 <= factor <= 1.2 and world.object()[1].com == (0.0, 0.0)
+        assert believed.parameters["controller"]["tracker"]["pose_delay"] == 0.01
+        assert "latency_s" not in row
+
+
+def test_none_is_what_is_believed():
+    ((believed, world, row),) = drawn("none", seeds=[5])
+    assert world.object()[1] == believed.object()[1] and world.robot()[1] == believed.robot()[1]
+    assert row["box_contact_friction"] == believed.object()[1].contact_friction
+
+
+def test_a_robot_without_wheels_and_an_unknown_name_are_refused():
+    with pytest.raises(SettingsError, match="none, mild, hard"):
+        uncertainty("much")
+    with pytest.raises(SettingsError, match="no wheels"):
+        replace(UNCERTAINTIES["mild"]).draw(load_scenario("discs1000"), 1)
