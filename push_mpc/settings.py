@@ -71,6 +71,9 @@ class ContactForceSettings(MpcSettings):
 class TrackerSettings:
     """When a trajectory is done, and when it has gone wrong."""
 
+    tracked: Literal["object", "robot"] = bounded(
+        "object", doc="what a push steers; the thesis steers the robot and hopes for the object"
+    )
     friction_trust: float = bounded(
         0.85, low=0.1, high=1.0, doc="fraction of the stable curvature the controller may use"
     )

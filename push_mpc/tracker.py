@@ -142,7 +142,7 @@ class TrajectoryTracker:
         reference = self._clock.reference(
             self.controller.horizon,
             self.controller.step,
-            np.zeros(3) if grasp is None else grasp.shift,
+            np.zeros(3) if grasp is None or self.settings.tracked == "robot" else grasp.shift,
         )
         error = self._error(robot, reference)
         self._lag = -float(error[0])

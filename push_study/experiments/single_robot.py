@@ -17,12 +17,10 @@ import numpy as np
 from push_model import se2
 from push_model.arrays import Array
 from push_model.settings import SettingsError
-from push_planner import DistanceField, PlannerSettings, PushScene
 from push_record.recorder import RecorderNode
 from push_ros.claims import own_domain
-from push_scenario.scenario import Scenario, load_scenario
-from push_study.graph_run import LockstepRun
-from push_study.observer import Trace, final_errors
+from push_scenario.scenario import load_scenario
+from push_study.job import run_job
 from push_study.pool import Row
 from push_study.study import StudyOptions
 from push_study.thesis import TABLE_2_1
@@ -33,11 +31,6 @@ from push_view.report import write_report
 
 SCENARIOS = tuple(f"env{e}-target{t}" for e in (1, 2, 3) for t in (1, 2, 3))
 """Where none are named."""
-
-SUCCESS_POSITION = 0.02
-"""[m] of the object at the end."""
-SUCCESS_ORIENTATION = 0.1
-"""[rad]."""
 
 
 @dataclass(frozen=True)
@@ -56,21 +49,6 @@ class SingleRobotTask:
     def trace_file(self) -> Path:
         """Where the trial leaves its trace; a scenario may be named by a path."""
         return Path(self.out) / f"trace-{Path(self.scenario).stem}-{self.seed}.npz"
-
-
-def min_clearance(scenario: Scenario, trace: Trace) -> float:
-    """[m] least clearance of robot and object over a run, from ground truth, every 0.1 s."""
-    _, robot = scenario.robot()
-    _, item = scenario.object()
-    scene = PushScene(DistanceField(scenario.grid), robot, item, PlannerSettings())
-    least = min(
-        (
-            min(scene.robot_clearance(r), scene.object_clearance(o))
-            for r, o in zip(trace.robot[::10], trace.object[::10], strict=False)
-        ),
-        default=float("nan"),
-    )
-    return float(least)
 
 
 def tasks(options: StudyOptions) -> list[SingleRobotTask]:
@@ -109,8 +87,6 @@ def trial(task: SingleRobotTask) -> Row:
 def _push(task: SingleRobotTask) -> Row:
     level = uncertainty(task.uncertainty)
     believed, world, drawn = level.draw(load_scenario(task.scenario), task.seed)
-    if believed.goal is None:
-        raise ValueError(f"scenario '{task.scenario}' has no goal")
     folder = Path(task.out)
     folder.mkdir(parents=True, exist_ok=True)  # on a machine of a cluster, perhaps
     if task.record and (folder / "bag").exists():
@@ -119,43 +95,16 @@ def _push(task: SingleRobotTask) -> Row:
     def extra() -> list[Any]:
         return [RecorderNode(folder / "bag", believed, task.seed)] if task.record else []
 
-    with LockstepRun(believed, extra, world=world, quiet=True) as run:
-        run.start()
-        state = run.reach(believed.goal)
-        trace = run.observer.trace
-        duration = run.bridge.time
+    measures, trace = run_job(believed, world, extra)
     if task.record:
         write_report(folder / "bag", folder / "report")
-    position, orientation = final_errors(trace, believed.goal)
-    reached = state is not None and state.error_code == 0
-    success = (
-        reached
-        and position <= SUCCESS_POSITION
-        and orientation <= SUCCESS_ORIENTATION
-        and trace.collisions == 0
-    )
     np.savez_compressed(
         task.trace_file,
         time=np.array(trace.time[::10]),
         robot=np.array(trace.robot[::10]),
         object=np.array(trace.object[::10]),
     )
-    return {
-        "scenario": task.scenario,
-        "seed": task.seed,
-        "success": success,
-        "reason": "no end within the time limit" if state is None else state.reason,
-        "position_error_m": position,
-        "orientation_error_rad": orientation,
-        "duration_s": duration,
-        "pushes": trace.pushes,
-        "contact_losses": trace.contact_losses,
-        "plan_time_s": trace.plan_time,
-        "min_clearance_m": min_clearance(believed, trace),
-        "collisions": trace.collisions,
-        "replans": 0 if state is None else int(state.replans),
-        **drawn,
-    }
+    return {"scenario": task.scenario, "seed": task.seed, **measures, **drawn}
 
 
 def conclude(options: StudyOptions, tasks: Sequence[SingleRobotTask], rows: list[Row]) -> None:
