@@ -8,6 +8,8 @@ from push_estimation.pose_gate import PoseGateSettings
 from push_model.settings import SettingsError, from_mapping
 from push_mpc.controllers import controller_kind
 from push_mpc.settings import ControllerSettings, MpcSettings, TrackerSettings
+from push_mpc.torque_tracker import TorqueTrackerSettings
+from push_mpc.wheel_slip_nmpc import WheelSlipSettings
 from push_planner import PlannerSettings
 from push_scenario.scenario import Scenario
 from push_supervisor import SupervisorSettings
@@ -28,6 +30,11 @@ SECTIONS: dict[str, dict[str, type[Any]]] = {
         "poses": PoseGateSettings,
     },
     "supervisor": {"": SupervisorSettings, "poses": PoseGateSettings},
+    "torque_controller": {
+        "nmpc": WheelSlipSettings,
+        "tracker": TorqueTrackerSettings,
+        "poses": PoseGateSettings,
+    },
 }
 """Node to its settings classes by section; the section "" is the node's own level. Another world
 or another controller has its own in the place of ``physics`` or ``mpc``."""
@@ -60,7 +67,13 @@ def check_settings(scenario: Scenario) -> None:
         for section, cls in sections_of(node, values).items():
             if section:
                 from_mapping(cls, own.pop(section, None), f"{scenario.name}.{node}.{section}")
-        from_mapping(SECTIONS[node][""], own, f"{scenario.name}.{node}")
+        if "" in SECTIONS[node]:
+            from_mapping(SECTIONS[node][""], own, f"{scenario.name}.{node}")
+        elif own:
+            known = ", ".join(SECTIONS[node])
+            raise SettingsError(
+                f"{scenario.name}.{node}: unknown key '{next(iter(own))}'; expected one of: {known}"
+            )
 
 
 def resolved(scenario: Scenario) -> Scenario:

@@ -11,6 +11,7 @@ from typing import Any
 
 from rclpy.node import Node
 
+from push_model.drives import TorqueDrive
 from push_model.settings import SettingsError
 from push_ros.names import inside, space
 from push_scenario.scenario import Scenario
@@ -29,6 +30,7 @@ MODULES = {
     "planner": "push_planner.node",
     "controller": "push_mpc.node",
     "supervisor": "push_supervisor.node",
+    "torque_controller": "push_mpc.torque_node",
     "recorder": "push_record.recorder",
 }
 """Kind of a node to the module whose ``main`` runs it in a process of its own."""
@@ -59,7 +61,7 @@ class NodeSpec:
         values: dict[str, Any] = {"scenario": scenario, **self.parameters}
         if self.kind in ("planner", "supervisor", "recorder"):
             values["world"] = self.world
-        if self.kind in ("controller", "supervisor"):
+        if self.kind in ("controller", "supervisor", "torque_controller"):
             values["robot"] = self.robot
         if self.kind == "supervisor":
             values["object"] = self.item
@@ -102,11 +104,18 @@ def _supervisor(spec: NodeSpec, scenario: Scenario) -> Node:
     )
 
 
+def _torque_controller(spec: NodeSpec, scenario: Scenario) -> Node:
+    from push_mpc.torque_node import TorqueControllerNode
+
+    return TorqueControllerNode(scenario, spec.robot, namespace=spec.world)
+
+
 _MAKERS: dict[str, Callable[[NodeSpec, Scenario], Node]] = {
     "bridge": _bridge,
     "planner": _planner,
     "controller": _controller,
     "supervisor": _supervisor,
+    "torque_controller": _torque_controller,
 }
 
 
@@ -155,7 +164,32 @@ def single(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
     return tuple(nodes)
 
 
-SYSTEMS: dict[str, Callable[[Scenario, str], tuple[NodeSpec, ...]]] = {"single": single}
+def torque(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
+    """A controller for each robot that is driven by wheel torques: it follows trajectories.
+
+    Raises
+    ------
+    SettingsError: there is no such robot.
+    """
+    world = _absolute(namespace)
+    driven = [n for n, (r, _) in scenario.robots.items() if isinstance(r.drive, TorqueDrive)]
+    if not driven:
+        raise SettingsError(
+            f"scenario '{scenario.name}': none of its robots is driven by wheel torques"
+        )
+    return (
+        NodeSpec("bridge", "bridge", world, world),
+        *(
+            NodeSpec(f"{n}/controller", "torque_controller", inside(namespace, n), world, n)
+            for n in driven
+        ),
+    )
+
+
+SYSTEMS: dict[str, Callable[[Scenario, str], tuple[NodeSpec, ...]]] = {
+    "single": single,
+    "torque": torque,
+}
 """Name of a system to the function that lists its nodes for a scenario in a namespace."""
 
 

@@ -52,7 +52,7 @@ __all__ = [
     "scenario_names",
 ]
 
-NODES = ("bridge", "planner", "controller", "supervisor")
+NODES = ("bridge", "planner", "controller", "supervisor", "torque_controller")
 """Nodes that a scenario may have parameters for."""
 
 

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 from push_model.bumpers import FlatBumper, RingBumper
 from push_model.specs import RobotSpec
+from push_model.torque_robot import BODY_HEIGHT
 
-COM_HEIGHT = -0.005
+COM_HEIGHT = BODY_HEIGHT
 """[m] Centre of mass of the body above the axle."""
 _UNDERSIDE = 0.005  # [m] of the body above the floor
 

@@ -59,7 +59,7 @@ def imported(path):
 
 def is_shell(path):
     """Whether a file may know ROS: the node of a package, and how it talks to other nodes."""
-    return path.name in ("node.py", "peers.py")
+    return path.name in ("node.py", "torque_node.py", "peers.py")
 
 
 FILES = sources()

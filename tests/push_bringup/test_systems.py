@@ -166,3 +166,20 @@ def test_what_is_chosen_by_name_is_known_before_anything_starts(node, name, why)
         prepare("short", parameters={node: {name: "atlantis"}})
     with pytest.raises(SettingsError, match="unknown"):
         prepare("short", parameters={node: {"typo": 1}})
+
+
+def test_the_system_torque_has_a_controller_for_each_robot_driven_by_torques():
+    nodes = nodes_of("torque", load_scenario("wheel-slip"), "lab")
+    assert [(n.name, n.kind, n.namespace) for n in nodes] == [
+        ("bridge", "bridge", "/lab"),
+        ("pioneer/controller", "torque_controller", "/lab/pioneer"),
+    ]
+    assert parameters(nodes[1].words("file"))["robot"] == "pioneer"
+    with pytest.raises(SettingsError, match="driven by wheel torques"):
+        prepare("short", system="torque")
+    own = {"torque_controller": {"nmpc": {"friction": 0.7}}}
+    made = prepare("wheel-slip", system="torque", parameters=own).scenario
+    assert made.parameters["torque_controller"]["nmpc"]["friction"] == 0.7
+    for wrong in ({"nmpc": {"friction": -1.0}}, {"mpc": {"horizon": 3}}):
+        with pytest.raises(SettingsError):
+            prepare("wheel-slip", system="torque", parameters={"torque_controller": wrong})

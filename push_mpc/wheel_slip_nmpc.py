@@ -1,0 +1,241 @@
+"""NMPC of section 2.3 for a robot driven by wheel torques: it tracks, and its wheels do not slip.
+
+The programme (2.14) is solved by sequential quadratic programming with the Gauss-Newton Hessian,
+from the last solution. A violation of a constraint costs ``rho s + rho_2 s^2``, s being the
+greatest one: exact as long as a feasible point exists, and the best there is where none does.
+"""
+
+import math
+import time
+from dataclasses import astuple, dataclass
+
+import numpy as np
+
+from push_model.arrays import Array
+from push_model.drives import TorqueDrive
+from push_model.limit_surface import GRAVITY
+from push_model.settings import SettingsError, bounded, settings
+from push_model.specs import RobotSpec
+from push_model.torque_robot import TorqueRobot
+from push_mpc.torque_prediction import CUTS, ROWS, predict
+from push_qp import Qp
+from push_qp.active_set import ActiveSetBackend
+from push_qp.programme import Index
+
+_DAMPING = 1e-6  # of the Hessian's diagonal: without weights on torques it may be singular
+_SHORTEST = 1.0 / 64.0  # step of a line search
+_ARMIJO = 1e-4
+_ACTIVE = 1e-7  # of what is left of a row that holds with equality
+
+
+@settings
+class WheelSlipSettings:
+    """Names and values of section 2.3.4."""
+
+    step: float = bounded(0.1, low=0.01, high=1.0, doc="[s] T_s")
+    horizon: int = bounded(15, low=2, high=100, doc="N, steps predicted")
+    control_horizon: int = bounded(6, low=1, high=100, doc="M, steps with torques of their own")
+    state_weight: tuple[float, float, float, float, float] = (2.5, 5.0, 0.25, 0.05, 0.05)
+    terminal_factor: float = bounded(4.0, low=0.0, high=1000.0, doc="P = factor * Q")
+    friction: float = bounded(0.5, low=0.01, high=3.0, doc="mu of the wheels that is believed")
+    friction_trust: float = bounded(
+        0.85, low=0.1, high=1.0, doc="fraction of that friction that wheels may ask for"
+    )
+    constraint: bool = bounded(True, doc="whether (2.31)-(2.33) are asked for")
+    position_limit: float = bounded(10.0, low=0.1, high=1e4, doc="[m] x_lim, y_lim")
+    penalty: float = bounded(100.0, low=0.1, high=1e6, doc="rho of the greatest violation")
+    penalty_square: float = bounded(1000.0, low=1e-3, high=1e8, doc="rho_2 of its square")
+    iterations: int = bounded(40, low=1, high=200, doc="quadratic programmes of a solve at most")
+    tolerance: float = bounded(1e-3, low=1e-8, high=1.0, doc="[Nm] of the last step")
+
+    def __post_init__(self) -> None:
+        if self.control_horizon > self.horizon:
+            raise SettingsError("control_horizon must not be greater than horizon")
+        if min(self.state_weight) < 0.0 or max(self.state_weight) == 0.0:
+            raise SettingsError("state_weight: none may be negative, and not all zero")
+
+
+@dataclass(frozen=True)
+class NmpcResult:
+    """torques: (right, left) [Nm] to apply now. cost: (2.15) with the penalty. violation: greatest
+    one, in tens of newtons, rad/s or m. iterations: quadratic programmes. solve_time [s] CPU.
+
+    solved is False when the torques must not be used; reason says why.
+    """
+
+    torques: tuple[float, float]
+    solved: bool
+    cost: float
+    violation: float
+    iterations: int
+    solve_time: float
+    reason: str
+
+
+def beside(state: Array, reference: Array) -> Array:
+    """The reference with headings that are continuous, and nearest to the state's at the start.
+
+    An error of heading that is wrapped within the horizon makes a further valley of every turn.
+    """
+    near = reference.copy()
+    near[:, 2] = np.unwrap(near[:, 2])
+    near[:, 2] += 2.0 * np.pi * np.round((state[2] - near[0, 2]) / (2.0 * np.pi))
+    return near
+
+
+class WheelSlipNmpc:
+    """One controller for one robot. Keeps the previous torques to begin with.
+
+    trusted: the friction that wheels may ask for; may be changed between solves.
+    """
+
+    def __init__(self, settings: WheelSlipSettings, spec: RobotSpec) -> None:
+        """Raises SettingsError where the robot is not one with torque-driven wheels."""
+        if not isinstance(spec.drive, TorqueDrive):
+            raise SettingsError("the wheel-slip NMPC needs a drive of kind 'torque'")
+        try:
+            self.robot = TorqueRobot.of(spec)
+        except ValueError as error:
+            raise SettingsError(f"the wheel-slip NMPC: {error}") from None
+        self.settings, self.drive = settings, spec.drive
+        s, n = settings, 2 * settings.control_horizon
+        self._fields = (*astuple(self.robot), GRAVITY)
+        self._Q = np.array(s.state_weight)
+        self._P = s.terminal_factor * self._Q
+        self._limits = np.array([s.position_limit, s.position_limit, spec.drive.max_wheel_speed])
+        rows = (ROWS + CUTS) * s.horizon
+        self._H, self._g = np.zeros((n, n)), np.zeros(n)
+        self._c, self._G = np.zeros(rows), np.zeros((rows, n))
+        self.trusted = s.friction_trust * s.friction
+        self._price = np.zeros((s.horizon, 2))
+        self._solver = ActiveSetBackend()
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the previous solution."""
+        self._z = np.zeros(2 * self.settings.control_horizon)
+        self._price[:] = 0.0
+        self._solver.reset()
+
+    @property
+    def start(self) -> Array:
+        """Torques ``(2 M,)`` that the next solve begins with."""
+        return self._z
+
+    def set_start(self, z: Array) -> None:
+        """Begin the next solve with torques ``(2 M,)``."""
+        self._z = z.copy()
+        self._price[:] = 0.0
+        self._solver.reset()
+
+    def warm_up(self) -> None:
+        """Compile and solve once, so that the first command does not wait."""
+        ahead = np.zeros((self.settings.horizon + 1, 5))
+        ahead[:, 0] = 0.1
+        self.solve(np.zeros(5), ahead)
+        self.reset()
+
+    def evaluate(self, z: Array, state: Array, reference: Array) -> tuple[float, float]:
+        """Cost (2.15) and greatest violation at torques ``(2 M,)``; fills in slopes."""
+        s = self.settings
+        cost = predict(
+            z,
+            state,
+            reference,
+            s.step,
+            self._fields,
+            self._Q,
+            self._P,
+            self.trusted if s.constraint else -1.0,
+            self._limits,
+            self._price,
+            self._H,
+            self._g,
+            self._c,
+            self._G,
+        )
+        return float(cost), max(0.0, float(self._c[: ROWS * s.horizon].max()))
+
+    def merit(self, cost: float, violation: float) -> float:
+        """What is minimised: the cost and the price of the greatest violation."""
+        s = self.settings
+        return cost + s.penalty * violation + s.penalty_square * violation**2
+
+    def solve(self, state: Array, reference: Array) -> NmpcResult:
+        """One step.
+
+        Parameters
+        ----------
+        state: ``(5,)`` x, y, theta, v, omega. reference: ``(N + 1, 5)`` of the same, first now.
+        """
+        started = time.thread_time()
+        s = self.settings
+        if not math.isfinite(float(state.sum() + reference.sum())):
+            return self._failed("input is not finite", started)
+        reference = beside(state, reference)
+        z, most = self._z.copy(), self.drive.max_torque
+        cost, violation = self.evaluate(z, state, reference)
+        value, count = self.merit(cost, violation), 0
+        for _ in range(s.iterations):
+            count += 1
+            qp, numbers = self._quadratic(z, most)
+            answer = self._solver.solve(qp)
+            if not answer.solved:
+                return self._failed(answer.status, started)
+            self._weigh(qp, numbers, answer.z)
+            d, slack = answer.z[:-1], float(answer.z[-1])
+            if float(np.abs(d).max()) < s.tolerance:
+                break
+            curve = float(self._g @ d) + self.merit(0.0, slack) - self.merit(0.0, violation)
+            part = 1.0
+            while True:
+                trial = z + part * d
+                cost, violation = self.evaluate(trial, state, reference)
+                after = self.merit(cost, violation)
+                if after <= value + _ARMIJO * part * min(curve, 0.0) or part < _SHORTEST:
+                    break
+                part *= 0.5
+            if after > value:  # no way down: as good as it gets
+                cost, violation = self.evaluate(z, state, reference)
+                break
+            z, value = trial, after
+        self._z = z
+        cpu = time.thread_time() - started
+        return NmpcResult((float(z[0]), float(z[1])), True, value, violation, count, cpu, "")
+
+    def _quadratic(self, z: Array, most: float) -> tuple[Qp, Index]:
+        """The step d from torques z, and the greatest violation s after it; numbers of its rows."""
+        settings, n = self.settings, len(z)
+        H = np.zeros((n + 1, n + 1))
+        H[:n, :n] = self._H
+        H[range(n), range(n)] += _DAMPING * max(1.0, float(self._H.diagonal().max()))
+        H[n, n] = 2.0 * settings.penalty_square
+        f = np.append(self._g, settings.penalty)
+        near = np.flatnonzero(self._c > -self._reach(most))
+        G = np.hstack([self._G[near], np.full((len(near), 1), -1.0)])
+        low, high = np.append(-most - z, 0.0), np.append(most - z, 1e6)
+        return Qp.dense(H, f, G, -self._c[near], low, high), near
+
+    def _weigh(self, qp: Qp, numbers: Index, solution: Array) -> None:
+        """Multipliers of the slip rows, from what the others leave of the gradient."""
+        G, b = qp.normal[0].T, qp.bound[0]
+        held = np.flatnonzero(b - G @ solution < _ACTIVE)
+        free = (solution - qp.low > _ACTIVE) & (qp.high - solution > _ACTIVE)
+        self._price[:] = 0.0
+        if not len(held):
+            return
+        left = -(qp.H @ solution + qp.f)[free]
+        multipliers = np.linalg.lstsq(G[held][:, free].T, left, rcond=None)[0]
+        for number, value in zip(numbers[held], multipliers, strict=True):
+            step, row = divmod(int(number), ROWS)
+            if step < len(self._price) and row < 2:
+                self._price[step, row] = max(0.0, float(value))
+
+    def _reach(self, most: float) -> float:
+        """By how much a step may change a constraint, generously: others need no row."""
+        return 2.0 * most * float(np.abs(self._G).sum(axis=1).max())
+
+    def _failed(self, reason: str, started: float) -> NmpcResult:
+        self.reset()
+        cpu = time.thread_time() - started
+        return NmpcResult((0.0, 0.0), False, math.inf, math.inf, 0, cpu, reason)

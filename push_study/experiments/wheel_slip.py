@@ -1,0 +1,286 @@
+"""Section 2.3.4, Figures 2.10-2.17: the Pioneer on a trajectory, with (2.31)-(2.33) and without.
+
+Case I: the robot alone. II: with its 3 kg box, which the controller does not know of. III: the
+controller believes the wheels' friction to be 0.7, it is 0.5.
+"""
+
+import hashlib
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+import rclpy
+from rclpy.action import ActionClient
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import JointState
+
+from push_bringup.node_settings import changed, resolved
+from push_bringup.systems import LOCKSTEP, nodes_of
+from push_model.arrays import Array
+from push_model.drives import TorqueDrive
+from push_model.settings import SettingsError
+from push_model.trajectory import Trajectory, along_curve
+from push_msgs.action import FollowTrajectory
+from push_msgs.msg import ControllerStatus, Poses
+from push_ros.claims import own_domain
+from push_ros.conversions import poses_from_ros, time_from_ros, trajectory_to_ros
+from push_ros.process import Spinner, prepare_environment
+from push_ros.qos import STATUS, STREAM
+from push_scenario.scenario import Scenario, load_scenario
+from push_study.pool import Row
+from push_study.study import StudyOptions
+
+SCENARIOS = ("wheel-slip",)
+"""Where none are named."""
+
+CASES = {1: "I: alone", 2: "II: 3 kg box", 3: "III: mu 0.7 believed"}
+START = np.array([0.0, -3.0, 0.0])
+"""Where the trajectory begins."""
+WAY = ((1.2, 0.0), (1.6, 0.9), (1.0, 0.0), (2.2, -0.8), (1.2, 0.0), (1.4, 0.9), (1.0, 0.0))
+"""Length [m] and curvature [1/m] of its portions."""
+SPEED, ACCELERATION = 0.6, 0.8
+WINDOW = 13.0
+"""[s] at the beginning over which slip counts, as in Figures 2.12-2.13."""
+_LIMIT = 60.0  # [s] of sim time
+_SPACING = 0.01  # [m]
+
+
+@dataclass(frozen=True)
+class SlipTask:
+    """One run. case: 1, 2, 3; constraint: (2.31)-(2.33); digest: of the scenario's text."""
+
+    scenario: str
+    seed: int
+    out: str
+    case: int
+    constraint: bool
+    digest: str = ""
+
+    @property
+    def trace_file(self) -> Path:
+        """Where the run leaves its trace."""
+        kind = "with" if self.constraint else "without"
+        return Path(self.out) / f"trace-{self.case}-{kind}-{self.seed}.npz"
+
+
+def trajectory(drive: TorqueDrive) -> Trajectory:
+    """Straight and round portions from ``START``, rest to rest."""
+    points, headings, curvatures = [START[:2]], [float(START[2])], [WAY[0][1]]
+    for length, curvature in WAY:
+        for _ in range(round(length / _SPACING)):
+            heading = headings[-1] + _SPACING * curvature
+            middle = 0.5 * (headings[-1] + heading)
+            step = _SPACING * np.array([np.cos(middle), np.sin(middle)])
+            points.append(points[-1] + step)
+            headings.append(heading)
+            curvatures.append(curvature)
+    way = np.array(points), np.array(headings), np.array(curvatures)
+    return along_curve(*way, drive, SPEED, ACCELERATION)
+
+
+def tasks(options: StudyOptions) -> list[SlipTask]:
+    """Every case with and without the constraint, as often as there are trials.
+
+    A seed draws where the robot starts: beside the beginning, as in case study I.
+    """
+    made = []
+    for name in options.scenarios:
+        scenario = load_scenario(name)
+        if not isinstance(scenario.robot()[1].drive, TorqueDrive):
+            raise SettingsError(f"scenario '{name}': the robot is not driven by wheel torques")
+        digest = hashlib.sha256(scenario.text.encode()).hexdigest()[:16]
+        made += [
+            SlipTask(name, seed, str(options.out), case, constraint, digest)
+            for case in CASES
+            for seed in range(options.seed, options.seed + options.trials)
+            for constraint in (True, False)
+        ]
+    return made
+
+
+def world_of(task: SlipTask) -> tuple[Scenario, Trajectory]:
+    """The scenario of a task, with what its controller believes, and the way."""
+    scenario = load_scenario(task.scenario)
+    name, robot = scenario.robot()
+    random = np.random.default_rng(task.seed)
+    away = random.uniform([-0.35, -0.25, -0.3], [-0.15, 0.25, 0.3])
+    if task.case == 2:  # the box stands before the robot, where the way begins
+        away = np.array([random.uniform(-0.3, -0.2), 0.0, 0.0])
+    scenario = replace(scenario, robots={name: (robot, START + away)})
+    ahead = robot.flat_bumper.distance + 0.13
+    items = {
+        n: (spec, START + [ahead, 0.0, 0.0] if task.case == 2 else START + [-2.0, -0.6, 0.0])
+        for n, (spec, _) in scenario.objects.items()
+    }
+    friction = 0.7 if task.case == 3 else robot.drive.wheel_friction  # type: ignore[union-attr]
+    scenario = replace(scenario, objects=items).settings(
+        "torque_controller", nmpc__friction=friction, nmpc__constraint=task.constraint
+    )
+    assert isinstance(robot.drive, TorqueDrive)
+    return scenario, trajectory(robot.drive)
+
+
+class Watcher(Node):
+    """Ground truth, wheels and solve times of a robot, and who sends it on its way."""
+
+    def __init__(self, robot: str) -> None:
+        super().__init__("watcher")
+        self.robot = robot
+        self.poses: dict[float, Array] = {}
+        self.wheels: dict[float, Array] = {}
+        self.solves: list[float] = []
+        self.create_subscription(Poses, "/ground_truth/poses", self._on_truth, STREAM)
+        self.create_subscription(JointState, f"/{robot}/joint_states", self._on_wheels, STREAM)
+        status = f"/{robot}/controller/status"
+        self.create_subscription(ControllerStatus, status, self._on_status, STATUS)
+        self.client = ActionClient(self, FollowTrajectory, f"/{robot}/follow_trajectory")
+
+    def _on_truth(self, message: Poses) -> None:
+        seen, _ = poses_from_ros(message, (self.robot,))
+        if self.robot in seen:
+            self.poses[time_from_ros(message.header.stamp)] = seen[self.robot]
+
+    def _on_wheels(self, message: JointState) -> None:
+        self.wheels[time_from_ros(message.header.stamp)] = np.array(message.velocity)
+
+    def _on_status(self, message: ControllerStatus) -> None:
+        if message.solve_time > 0.0:
+            self.solves.append(float(message.solve_time))
+
+    def table(self) -> tuple[Array, Array, Array]:
+        """Times ``(n,)``, poses ``(n, 3)``, wheel speeds ``(n, 2)`` [rad/s] (left, right)."""
+        stamps = sorted(set(self.poses) & set(self.wheels))
+        poses = np.array([self.poses[t] for t in stamps])
+        return np.array(stamps), poses, np.array([self.wheels[t] for t in stamps])
+
+
+def slips(time: Array, poses: Array, wheels: Array, drive: TorqueDrive) -> Array:
+    """``(n, 2)`` [m/s]: surface speed of each wheel less that of its axle along the heading."""
+    turn = np.gradient(np.unwrap(poses[:, 2]), time)
+    x, y = np.gradient(poses[:, 0], time), np.gradient(poses[:, 1], time)
+    v = np.cos(poses[:, 2]) * x + np.sin(poses[:, 2]) * y
+    axle = v[:, None] + turn[:, None] * drive.half_track * np.array([-1.0, 1.0])
+    result: Array = wheels * drive.wheel_radius - axle
+    return result
+
+
+def trial(task: SlipTask) -> Row:
+    """Follow the trajectory once."""
+    with own_domain():
+        return _follow(task)
+
+
+def _follow(task: SlipTask) -> Row:
+    scenario, way = world_of(task)
+    scenario = scenario.settings("bridge", lockstep=True, seed=task.seed)
+    scenario = resolved(changed(scenario, LOCKSTEP, only_missing=True))
+    name, robot = scenario.robot()
+    assert isinstance(robot.drive, TorqueDrive)
+    prepare_environment()
+    with ExitStack() as stack:
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        stack.callback(rclpy.try_shutdown)
+        watcher = Watcher(name)
+        nodes = [spec.make(scenario) for spec in nodes_of("torque", scenario)]
+        bridge: Any = nodes[0]
+        spinner = Spinner([*nodes, watcher])
+        stack.callback(spinner.close)
+        ready = spinner.until(
+            lambda: (
+                len(bridge.commanded()) == 1
+                and bool(bridge.heard_by(1))
+                and watcher.client.server_is_ready()
+            ),
+            20.0,
+        )
+        if not ready:
+            raise RuntimeError("the nodes did not find each other")
+        bridge.start()
+        goal = FollowTrajectory.Goal(trajectory=trajectory_to_ros(way))
+        sent = watcher.client.send_goal_async(goal)
+        spinner.until(sent.done, 20.0)
+        begin, answer = bridge.time, sent.result().get_result_async()
+        spinner.until(lambda: answer.done() or bridge.time > begin + _LIMIT, 600.0)
+        result = answer.result().result if answer.done() else None
+    time, poses, wheels = watcher.table()
+    after = (time >= begin) & (time <= begin + way.duration)
+    time, poses, wheels = time[after] - begin, poses[after], wheels[after]
+    slip = slips(time, poses, wheels, robot.drive)
+    aim, _ = way.sample(time)
+    errors = np.hypot(*(poses[:, :2] - aim[:, :2]).T)
+    window = time <= WINDOW
+    Path(task.out).mkdir(parents=True, exist_ok=True)
+    np.savez_compressed(
+        task.trace_file, time=time, robot=poses, slip=slip, error=errors, aim=aim[:, :2]
+    )
+    why = "no end within the time limit" if result is None else result.error_msg or "done"
+    rms = float(np.sqrt((slip[window] ** 2).mean()))
+    return {
+        "scenario": task.scenario,
+        "seed": task.seed,
+        "success": result is not None and result.error_code == 0,
+        "reason": f"case {task.case} {'with' if task.constraint else 'without'}: slip {rms:.4f} "
+        f"m/s rms, {np.abs(slip).max():.3f} most; {why}",
+        "case": task.case,
+        "constraint": task.constraint,
+        "slip_rms_m_s": rms,
+        "slip_max_m_s": float(np.abs(slip).max()),
+        "error_rms_m": float(np.sqrt((errors**2).mean())),
+        "final_error_m": float(errors[-1]),
+        "solve_p99_ms": 1e3 * float(np.quantile(watcher.solves or [np.nan], 0.99)),
+    }
+
+
+def conclude(options: StudyOptions, tasks: Sequence[SlipTask], rows: list[Row]) -> None:
+    """What the constraint saves in each case, and the plots."""
+    print("\n                        slip rms [m/s]          saved   position error rms [m]")
+    print("                        with       without               with       without    ratio")
+    for case, name in CASES.items():
+        pair = [
+            [r for r in rows if r.get("case") == case and r.get("constraint") is constraint]
+            for constraint in (True, False)
+        ]
+        if not all(pair):
+            continue
+        slip = [float(np.mean([r["slip_rms_m_s"] for r in side])) for side in pair]
+        error = [float(np.mean([r["error_rms_m"] for r in side])) for side in pair]
+        print(
+            f"{name:22s}{slip[0]:9.4f}{slip[1]:13.4f}{100 * (1 - slip[0] / slip[1]):10.1f} %"
+            f"{error[0]:12.4f}{error[1]:13.4f}{error[0] / error[1]:9.2f}"
+        )
+    late = [r["solve_p99_ms"] for r in rows if "solve_p99_ms" in r]
+    if late:
+        print(f"a solve: {max(late):.2f} ms p99 (CPU)")
+    _plot(tasks, options.out)
+
+
+def _plot(tasks: Sequence[SlipTask], out: Path) -> None:
+    """Figures 2.10-2.17: ways, errors and slips of each case, first seed."""
+    figure, axes = plt.subplots(len(CASES), 3, figsize=(14, 9), squeeze=False)
+    for row, (case, name) in zip(axes, CASES.items(), strict=True):
+        for constraint, colour in ((False, "#c22f3d"), (True, "#2a62c9")):
+            chosen = [t for t in tasks if (t.case, t.constraint) == (case, constraint)]
+            if chosen and chosen[0].trace_file.is_file():
+                trace = np.load(chosen[0].trace_file)
+                label = "with" if constraint else "without"
+                row[0].plot(*trace["aim"].T, color="#777777", lw=0.6)
+                row[0].plot(*trace["robot"][:, :2].T, color=colour, lw=1.0, label=label)
+                row[1].plot(trace["time"], trace["error"], color=colour, lw=0.8)
+                row[2].plot(trace["time"], trace["slip"], color=colour, lw=0.6)
+        row[0].set_aspect("equal")
+        row[0].set_ylabel(name)
+        row[1].set_ylabel("position error [m]")
+        row[2].set_ylabel("slip of the wheels [m/s]")
+        if row[0].get_legend_handles_labels()[0]:
+            row[0].legend(fontsize=7)
+    figure.savefig(out / "wheel-slip.png", dpi=130, bbox_inches="tight")
+    plt.close(figure)

@@ -1,0 +1,167 @@
+"""The wheel-slip NMPC in the graph: poses and wheel states in, torques out; and what stops it."""
+
+from contextlib import ExitStack
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import rclpy
+from rclpy.action import ActionClient
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+
+from push_bringup.node_settings import changed, resolved
+from push_bringup.systems import LOCKSTEP, nodes_of
+from push_model.trajectory import line
+from push_msgs.action import FollowTrajectory
+from push_msgs.msg import WheelTorques
+from push_ros.conversions import trajectory_to_ros
+from push_ros.process import Spinner
+from push_ros.qos import COMMAND, STREAM
+from push_scenario.events import DropPoses
+from push_scenario.scenario import load_scenario
+from push_study.experiments import wheel_slip
+from push_study.study import StudyOptions
+
+CODES = FollowTrajectory.Result
+
+
+class Run:
+    """Bridge, controller and somebody who asks, in lockstep."""
+
+    def __init__(self, stack, events=()):
+        scenario = replace(load_scenario("wheel-slip"), events=tuple(events))
+        scenario = scenario.settings("bridge", lockstep=True)
+        scenario = resolved(changed(scenario, LOCKSTEP, only_missing=True))
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        stack.callback(rclpy.try_shutdown)
+        self.bridge, self.node = (s.make(scenario) for s in nodes_of("torque", scenario))
+        self.me = Node("me")
+        self.client = ActionClient(self.me, FollowTrajectory, "/pioneer/follow_trajectory")
+        self.heartbeat = self.me.create_publisher(Header, "/pioneer/heartbeat", STREAM)
+        self.wheels = self.me.create_publisher(JointState, "/pioneer/joint_states", STREAM)
+        self.torques = []
+        topic = "/pioneer/wheel_torques"
+        self.me.create_subscription(WheelTorques, topic, self.torques.append, COMMAND)
+        self.spinner = Spinner([self.bridge, self.node, self.me])
+        stack.callback(self.spinner.close)
+        assert self.spinner.until(
+            lambda: (
+                len(self.bridge.commanded()) == 1
+                and bool(self.bridge.heard_by(1))
+                and self.client.server_is_ready()
+            ),
+            20.0,
+        )
+        self.bridge.start()
+
+    def spin(self, seconds):
+        end = self.bridge.time + seconds
+        assert self.spinner.until(lambda: self.bridge.time >= end, 120.0)
+
+    def send(self, length=2.0, **values):
+        start = load_scenario("wheel-slip").robot()[1], self.bridge.world.poses()["pioneer"]
+        way = line(start[1], length, 0.5, 0.6)
+        goal = FollowTrajectory.Goal(trajectory=trajectory_to_ros(way), **values)
+        sent = self.client.send_goal_async(goal)
+        assert self.spinner.until(sent.done, 20.0)
+        return sent.result()
+
+    def result(self, handle, limit=30.0):
+        answer = handle.get_result_async()
+        end = self.bridge.time + limit
+        self.spinner.until(lambda: answer.done() or self.bridge.time > end, 240.0)
+        return answer.result().result
+
+    @property
+    def x(self):
+        return float(self.bridge.world.poses()["pioneer"][0])
+
+    def stands(self):
+        """Comes to rest within a second, and stays."""
+        self.spin(1.0)
+        before = self.bridge.world.poses()["pioneer"]
+        self.spin(0.5)
+        return np.abs(self.bridge.world.poses()["pioneer"] - before).max() < 2e-3
+
+
+@pytest.fixture
+def run():
+    with ExitStack() as stack:
+        yield Run(stack)
+
+
+def test_it_follows_a_line_by_torques_and_stands_before_and_after(run):
+    assert run.stands() and not run.torques
+    begin = run.x
+    result = run.result(run.send(1.0))
+    assert result.error_code == CODES.NONE, result.error_msg
+    assert run.x - begin == pytest.approx(1.0, abs=0.1) and len(run.torques) > 50
+    assert all(np.isfinite([t.left, t.right]).all() for t in run.torques)
+    count = len(run.torques)
+    assert run.stands() and len(run.torques) == count
+
+
+def test_a_push_is_refused_and_a_broken_trajectory_too(run):
+    assert not run.send(mode=FollowTrajectory.Goal.PUSH).accepted
+    assert not run.send(heartbeat_timeout=float("nan")).accepted
+    assert not run.send(heartbeat_timeout=-1.0).accepted
+    empty = FollowTrajectory.Goal()
+    sent = run.client.send_goal_async(empty)
+    assert run.spinner.until(sent.done, 20.0) and not sent.result().accepted
+    assert run.stands()
+
+
+@pytest.mark.parametrize("how", ["cancel", "heartbeat"])
+def test_it_stands_when(run, how):
+    """Canceled; the sender silent."""
+    timeout = 0.3 if how == "heartbeat" else 0.0
+    handle = run.send(6.0, heartbeat_timeout=timeout)
+    answer = handle.get_result_async()
+    run.spin(0.2)
+    if how == "cancel":
+        run.spin(0.8)
+        assert run.torques
+        handle.cancel_goal_async()
+    assert run.spinner.until(answer.done, 30.0)
+    expected = CODES.CANCELED if how == "cancel" else CODES.PREEMPTED
+    assert answer.result().result.error_code == expected
+    assert run.stands()
+
+
+def test_wheel_states_of_nonsense_are_counted_and_change_nothing(run):
+    for speeds in ([], [1.0], [1.0, 2.0, 3.0], [float("nan"), 1.0]):
+        run.wheels.publish(JointState(velocity=speeds))
+        run.spin(0.1)
+    result = run.result(run.send(0.6))
+    assert result.error_code == CODES.NONE, result.error_msg
+    assert run.node._diagnostics.refused["joint_states"] == 4
+
+
+def test_without_poses_it_stands_and_gives_up():
+    with ExitStack() as stack:
+        run = Run(stack, events=[DropPoses(1.5, ("pioneer",), 60.0)])
+        answer = run.send(6.0).get_result_async()
+        run.spin(1.5 - run.bridge.time)
+        assert run.torques and run.stands()
+        run.spin(4.0)
+        assert run.spinner.until(answer.done, 30.0)
+        assert answer.result().result.error_code == CODES.POSES_STALE
+
+
+@pytest.mark.parametrize("case", [1, 3])
+def test_the_constraint_takes_the_slip_away(tmp_path, case):
+    rows = [
+        wheel_slip.trial(wheel_slip.SlipTask("wheel-slip", 2, str(tmp_path), case, constraint))
+        for constraint in (True, False)
+    ]
+    assert all(r["success"] for r in rows), rows
+    kept = rows[0]["slip_rms_m_s"] / rows[1]["slip_rms_m_s"]
+    assert kept < (0.2 if case == 1 else 0.5)
+    assert rows[0]["error_rms_m"] < 1.2 * rows[1]["error_rms_m"]
+    if case == 1:
+        tasks = wheel_slip.tasks(StudyOptions(("wheel-slip",), 1, 2, tmp_path))
+        wheel_slip.conclude(StudyOptions(("wheel-slip",), 1, 2, tmp_path), tasks, rows)
+        assert (tmp_path / "wheel-slip.png").stat().st_size > 5000
