@@ -6,7 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from push_study.experiments import line_tracking, three_push
+from push_model import se2
+from push_scenario.scenario import load_scenario
+from push_study.experiments import displaced, goals_in_a_row, line_tracking, three_push
 from push_study.study import StudyOptions, run_study
 
 
@@ -76,3 +78,36 @@ def test_uncertainty_is_part_of_what_a_study_is(tmp_path):
     (tmp_path / "study.json").write_text(json.dumps(mark))
     with pytest.raises(FileExistsError, match="uncertainty is 'hard', this one's is 'mild'"):
         run_study("three-push", StudyOptions(("three-push",), 1, 1, tmp_path))
+
+
+def test_a_box_that_is_moved_in_mid_push_comes_to_its_goal_all_the_same(tmp_path, capsys):
+    options = StudyOptions(("env3-target1",), 1, 4, tmp_path)
+    (task,) = displaced.tasks(options)
+    row = displaced.trial(task)
+    assert row["success"] and row["collisions"] == 0, row
+    assert row["displaced_m"] > 0.005 and row["position_error_m"] < 0.01
+    displaced.conclude(options, [task], [row])
+    assert "1 of 1 within 10 mm" in capsys.readouterr().out
+
+
+def test_disturbances_fill_their_ranges_and_differ_between_scenarios():
+    events = [displaced.disturbance(load_scenario("env1-target1"), s) for s in range(300)]
+    far = np.array([np.hypot(*e.by[:2]) for e in events])
+    turn = np.array([e.by[2] for e in events])
+    assert far.max() <= displaced.FAR and far.max() > 0.039 and np.abs(turn).max() > 0.115
+    assert {e.body for e in events} == {"box"} and min(e.at for e in events) >= 12.0
+    other = displaced.disturbance(load_scenario("env1-target2"), 0)
+    assert other.by != events[0].by
+
+
+def test_goals_in_a_row_are_reached_without_a_reset(tmp_path, capsys):
+    (task,) = goals_in_a_row.tasks(StudyOptions(("env3-target1",), 1, 2, tmp_path))
+    assert task.goals == 56
+    row = goals_in_a_row.trial(replace(task, goals=2))
+    assert row["success"] and row["missed"] == 0, row["reason"]
+    goals_in_a_row.conclude(StudyOptions(("env3-target1",), 1, 2, tmp_path), [task], [row])
+    assert "0 of 56 goals missed" in capsys.readouterr().out
+    scenario = load_scenario("env3-target1")
+    for goal in goals_in_a_row.draw_goals(scenario, 100, 3):
+        outline = se2.transform(goal, scenario.object()[1].outline)
+        assert np.abs(outline[:, 0]).max() < 1.43 and np.abs(outline[:, 1]).max() < 0.93
