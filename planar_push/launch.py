@@ -3,6 +3,7 @@
 import argparse
 import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from planar_push.words import (
     add_factor,
@@ -11,6 +12,9 @@ from planar_push.words import (
     add_system,
     stop_on_signals,
 )
+
+if TYPE_CHECKING:
+    from push_bringup.preparation import SuiteSetup
 
 
 def add_words(parser: argparse.ArgumentParser) -> None:
@@ -27,7 +31,6 @@ def run(arguments: argparse.Namespace) -> int:
     """Check everything, then start."""
     from push_bringup.launcher import Launcher
     from push_bringup.preparation import check_domain, prepare
-    from push_bringup.systems import teams_of
 
     setup = prepare(
         arguments.scenario,
@@ -41,11 +44,18 @@ def run(arguments: argparse.Namespace) -> int:
         launcher = Launcher(setup.write(Path(folder)), respawn=arguments.respawn)
         stop_on_signals(launcher.request_stop)
         launcher.start()
-        words = f" --namespace {arguments.namespace}" if arguments.namespace else ""
-        team = teams_of(setup.scenario)[0].name
-        words += f" --team {team}" if team else ""
-        print(
-            f"running {arguments.scenario}; send a goal with: planar-push goal X Y THETA{words}",
-            flush=True,
-        )
+        print(f"running {arguments.scenario}; {_what_next(setup)}", flush=True)
         return launcher.run()
+
+
+def _what_next(setup: "SuiteSetup") -> str:
+    """How to make it do something."""
+    from push_bringup.systems import teams_of
+
+    if all(node.kind != "supervisor" for node in setup.nodes):
+        spaces = [n.namespace for n in setup.nodes if n.kind == "torque_controller"]
+        return "send trajectories to: " + ", ".join(f"{s}/follow_trajectory" for s in spaces)
+    words = f" --namespace {setup.namespace}" if setup.namespace else ""
+    team = teams_of(setup.scenario)[0].name
+    words += f" --team {team}" if team else ""
+    return f"send a goal with: planar-push goal X Y THETA{words}"

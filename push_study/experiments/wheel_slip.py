@@ -282,5 +282,8 @@ def _plot(tasks: Sequence[SlipTask], out: Path) -> None:
         row[2].set_ylabel("slip of the wheels [m/s]")
         if row[0].get_legend_handles_labels()[0]:
             row[0].legend(fontsize=7)
+    axes[-1][0].set_xlabel("x, y [m]")
+    for column in (1, 2):
+        axes[-1][column].set_xlabel("time [s]")
     figure.savefig(out / "wheel-slip.png", dpi=130, bbox_inches="tight")
     plt.close(figure)

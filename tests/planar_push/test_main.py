@@ -139,3 +139,13 @@ def test_numbers_on_the_command_line():
     for parse, text in ((words.positive, "0"), (words.finite, "nan"), (words.whole(1), "0")):
         with pytest.raises(words.argparse.ArgumentTypeError):
             parse(text)
+
+
+def test_launch_says_what_to_do_next():
+    from planar_push.launch import _what_next
+    from push_bringup.preparation import prepare
+
+    setup = prepare("two-singles", namespace="lab")
+    assert _what_next(setup).endswith("planar-push goal X Y THETA --namespace lab --team south")
+    torque = prepare("wheel-slip", system="torque")
+    assert _what_next(torque) == "send trajectories to: /pioneer/follow_trajectory"
