@@ -23,7 +23,7 @@ def preemptive_pushes(
     start: Array,
     goal: Array,
     seed: int,
-    lengths: tuple[float, ...] = (0.15, 0.3, 0.5),
+    lengths: tuple[float, ...] = (0.15, 0.3, 0.5, 0.8, 1.1, 1.4),
     curvatures: int = 3,
 ) -> list[PushSegment]:
     """Constant-curvature pushes of the object from ``start`` ``(3,)`` that collide with nothing.

@@ -7,7 +7,13 @@ import pytest
 
 from push_model import se2
 from push_model.outlines import overlap
-from push_planner import PlanError, PlannerSettings, PlanningFailed, PushPlanner
+from push_planner import (
+    PlanError,
+    PlannerSettings,
+    PlanningFailed,
+    PushPlanner,
+    plan_after_preemptive_push,
+)
 from push_scenario.scenario import load_scenario
 
 PRINTED = PlannerSettings(planner="thesis")
@@ -100,3 +106,31 @@ def test_few_pushes_end_it_with_the_reason():
     with pytest.raises(PlanningFailed, match="no sequence of pushes") as error:
         planner.solve(start_of(scenario), scenario.goal)
     assert error.value.code is PlanError.NO_PUSH_SEQUENCE
+
+
+def rescued(planner, start, goal, seed):
+    """The plan that begins with a pre-emptive push of this draw, if there is one."""
+    best = None
+    try:
+        for progress in plan_after_preemptive_push(planner, start, goal, seed):
+            best = progress.best or best
+    except PlanningFailed as error:
+        why = str(error)
+    if best is None:
+        assert "pre-emptive pushes opens a way" in why
+    return best
+
+
+@pytest.mark.parametrize(("name", "least"), [("env2-target2", 2), ("env3-target2", 3)])
+def test_a_pre_emptive_push_saves_it_as_the_thesis_tells(name, least):
+    """Scenario 5, and 8; most draws of four do."""
+    scenario = load_scenario(name)
+    planner = planner_of(scenario, PRINTED)
+    start, goal = start_of(scenario), scenario.goal
+    assert solved(planner, start, goal) is None
+    plans = [p for p in (rescued(planner, start, goal, s) for s in (2, 3, 4, 5)) if p is not None]
+    assert len(plans) >= least
+    for plan in plans:
+        assert len(plan.segments) >= 2
+        assert plan.segments[0].object_start == pytest.approx(start)
+        assert plan.segments[-1].object_end == pytest.approx(goal)
