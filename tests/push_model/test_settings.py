@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 from push_estimation.pose_gate import PoseGateSettings
 from push_model.settings import SettingsError, bounded, from_mapping, settings
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
-from push_mpc.settings import MpcSettings, TrackerSettings
+from push_mpc.settings import ContactForceSettings, MpcSettings, TrackerSettings
+from push_mpc.torque_tracker import TorqueTrackerSettings
+from push_mpc.wheel_slip_nmpc import WheelSlipSettings
 from push_planner.settings import PlannerSettings
 from push_supervisor.settings import SupervisorSettings
 from sim_bridge.settings import BridgeSettings, MotionCaptureSettings, PhysicsSettings
@@ -25,6 +27,9 @@ ALL = (
     BridgeSettings,
     MotionCaptureSettings,
     PhysicsSettings,
+    ContactForceSettings,
+    WheelSlipSettings,
+    TorqueTrackerSettings,
 )
 
 
@@ -161,7 +166,7 @@ def test_every_bound_is_kept_in_files_and_in_code(cls):
         whole = isinstance(field.default, int)
         for key, away in (("low", -1.0), ("high", 1.0)):
             edge = field.metadata.get(key)
-            if edge is None:
+            if edge is None or math.isinf(edge):
                 continue
             outside = int(edge) + int(away) if whole else math.nextafter(edge, away * math.inf)
             for build in (lambda v: cls(**v), lambda v: from_mapping(cls, v)):

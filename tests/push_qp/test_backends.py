@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from push_model import CurvatureLimits, DifferentialDrive
-from push_mpc import LtvMpc, MpcSettings, Reference
+from push_mpc import Contact, LtvMpc, MpcSettings, Reference
 from push_qp import ActiveSetBackend, DaqpBackend, OsqpBackend, Qp, backend, factors
 from push_qp import goldfarb_idnani as kernel
 from push_qp.active_set import iteration_limit
@@ -159,7 +159,7 @@ def tick_programme(random, p=20, obstacles=20):
     error = random.normal(size=5) * [0.01, 0.02, 0.2, 0.02, 0.2]
     settings = MpcSettings(horizon=p, max_obstacles=obstacles)
     mpc = LtvMpc(settings, DifferentialDrive(0.0205, 0.0265, 6.28))
-    return mpc.programme(error, reference, CurvatureLimits(-1.8, 1.8), circles)
+    return mpc.programme(error, reference, Contact(CurvatureLimits(-1.8, 1.8)), circles)
 
 
 def test_the_cap_on_iterations_grows_with_the_programme():
