@@ -19,7 +19,7 @@ from push_model.arrays import Array
 from push_model.kinematics import DifferentialDrive
 from push_mpc.controller import Contact, MpcResult, Reference
 from push_mpc.ltv_mpc import LtvMpc
-from push_mpc.prediction import CHANGES, CURVATURES, OUTPUTS, SLACKS, WHEELS, condense, tick_rows
+from push_mpc.prediction import CHANGES, CURVATURES, OUTPUTS, SLACKS, WHEELS, tick_rows
 from push_mpc.settings import ContactForceSettings
 from push_qp import Qp, QpBackend
 
@@ -85,22 +85,7 @@ class ContactForceMpc(LtvMpc):
         if len(circles) > s.max_obstacles:
             raise ValueError(f"{len(circles)} obstacles, at most {s.max_obstacles} have a row")
         twist = np.ascontiguousarray(reference.twist)
-        condense(
-            error,
-            self._nominal,
-            self._previous,
-            twist,
-            s.step,
-            self._Q,
-            self._P,
-            self._R,
-            self._Rd,
-            qp.H,
-            qp.f,
-            qp.S,
-            qp.g,
-            self._rollout,
-        )
+        self._condense(error, twist)
         tick_rows(
             twist,
             self._rollout,

@@ -135,22 +135,7 @@ class LtvMpc:
         if len(circles) > s.max_obstacles:
             raise ValueError(f"{len(circles)} obstacles, at most {s.max_obstacles} have a row")
         twist = np.ascontiguousarray(reference.twist)
-        condense(
-            error,
-            self._nominal,
-            self._previous,
-            twist,
-            s.step,
-            self._Q,
-            self._P,
-            self._R,
-            self._Rd,
-            qp.H,
-            qp.f,
-            qp.S,
-            qp.g,
-            self._rollout,
-        )
+        self._condense(error, twist)
         limits = None if contact is None else contact.limits
         low, high = (0.0, 0.0) if limits is None else (limits.minimum, limits.maximum)
         tick_rows(
@@ -167,6 +152,26 @@ class LtvMpc:
             qp.bound,
         )
         return qp
+
+    def _condense(self, error: Array, twist: Array) -> None:
+        """Cost and outputs of this step, about the previous solution: into the programme."""
+        s, qp = self.settings, self._qp
+        condense(
+            error,
+            self._nominal,
+            self._previous,
+            twist,
+            s.step,
+            self._Q,
+            self._P,
+            self._R,
+            self._Rd,
+            qp.H,
+            qp.f,
+            qp.S,
+            qp.g,
+            self._rollout,
+        )
 
     def _failed(self, reason: str, started: float) -> MpcResult:
         self.reset()

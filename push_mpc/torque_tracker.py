@@ -153,7 +153,7 @@ class TorqueTracker:
         self.speed.update(dt, pose, *self._torques)
         self._adapt(dt, wheels)
         reference = self.reference()
-        self._time += dt
+        self._time += min(dt, _LONGEST)  # after a gap in the poses the reference has waited
         error = se2.between(np.append(reference[0, :2], se2.wrap(float(reference[0, 2]))), pose)
         off = float(np.hypot(error[0], error[1]))
         progress = min(1.0, self._time / trajectory.duration)

@@ -1,5 +1,6 @@
 """One job of one robot in lockstep, and what it amounts to."""
 
+import hashlib
 from collections.abc import Callable
 
 from rclpy.node import Node
@@ -14,6 +15,11 @@ SUCCESS_POSITION = 0.02
 """[m] of the object at the end."""
 SUCCESS_ORIENTATION = 0.1
 """[rad]."""
+
+
+def digest(scenario: Scenario) -> str:
+    """Of a scenario's text, for tasks: a changed scenario is another task."""
+    return hashlib.sha256(scenario.text.encode()).hexdigest()[:16]
 
 
 def min_clearance(scenario: Scenario, trace: Trace) -> float:

@@ -1,6 +1,5 @@
 """Somebody moves the box in mid-push: what the supervisor makes of it, in the nine scenarios."""
 
-import hashlib
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,7 +11,7 @@ from push_ros.claims import own_domain
 from push_scenario.events import Displace
 from push_scenario.scenario import Scenario, load_scenario
 from push_study.experiments.single_robot import SCENARIOS as NINE
-from push_study.job import run_job
+from push_study.job import digest, run_job
 from push_study.pool import Row
 from push_study.study import StudyOptions
 from push_study.uncertainty import uncertainty
@@ -45,9 +44,9 @@ def tasks(options: StudyOptions) -> list[DisplacedTask]:
         scenario = load_scenario(name)
         if scenario.goal is None:
             raise SettingsError(f"scenario '{name}' has no goal")
-        digest = hashlib.sha256(scenario.text.encode()).hexdigest()[:16]
+        text = digest(scenario)
         made += [
-            DisplacedTask(name, seed, str(options.out), options.uncertainty, digest)
+            DisplacedTask(name, seed, str(options.out), options.uncertainty, text)
             for seed in range(options.seed, options.seed + options.trials)
         ]
     return made

@@ -1,6 +1,5 @@
 """Random goals one after the other in environment 3, without a reset: nothing wears out."""
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,6 +10,7 @@ from push_planner import DistanceField, PlannerSettings, PushScene
 from push_ros.claims import own_domain
 from push_scenario.scenario import Scenario, load_scenario
 from push_study.graph_run import LockstepRun
+from push_study.job import digest
 from push_study.observer import final_errors
 from push_study.pool import Row
 from push_study.study import StudyOptions
@@ -42,9 +42,9 @@ def tasks(options: StudyOptions) -> list[RowTask]:
     """Every scenario, as often as there are trials."""
     made = []
     for name in options.scenarios:
-        digest = hashlib.sha256(load_scenario(name).text.encode()).hexdigest()[:16]
+        text = digest(load_scenario(name))
         made += [
-            RowTask(name, seed, str(options.out), options.uncertainty, digest=digest)
+            RowTask(name, seed, str(options.out), options.uncertainty, digest=text)
             for seed in range(options.seed, options.seed + options.trials)
         ]
     return made

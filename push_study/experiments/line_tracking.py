@@ -1,6 +1,5 @@
 """Section 2.4.6, Figures 2.20-2.21: a straight line from an offset, with (2.53) and without it."""
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,6 +23,7 @@ from push_ros.claims import own_domain
 from push_ros.conversions import pose_to_ros, trajectory_to_ros
 from push_scenario.scenario import Scenario, load_scenario
 from push_study.graph_run import LockstepRun
+from push_study.job import digest
 from push_study.pool import Row
 from push_study.study import StudyOptions
 from push_study.uncertainty import uncertainty
@@ -86,9 +86,9 @@ def tasks(options: StudyOptions) -> list[LineTask]:
         scenario = load_scenario(name)
         if scenario.object()[1].geometry.sides == ():
             raise SettingsError(f"scenario '{name}': the object has no side to push on")
-        digest = hashlib.sha256(scenario.text.encode()).hexdigest()[:16]
+        text = digest(scenario)
         made += [
-            LineTask(name, seed, str(options.out), phi, variant, options.uncertainty, digest)
+            LineTask(name, seed, str(options.out), phi, variant, options.uncertainty, text)
             for phi in OFFSETS
             for variant in VARIANTS
             for seed in range(options.seed, options.seed + options.trials)

@@ -1,6 +1,5 @@
 """Section 2.6, Table 2.1: one robot brings an object to a pose; noise and uncertain friction."""
 
-import hashlib
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,7 +19,7 @@ from push_model.settings import SettingsError
 from push_record.recorder import RecorderNode
 from push_ros.claims import own_domain
 from push_scenario.scenario import load_scenario
-from push_study.job import run_job
+from push_study.job import digest, run_job
 from push_study.pool import Row
 from push_study.study import StudyOptions
 from push_study.thesis import TABLE_2_1
@@ -63,7 +62,7 @@ def tasks(options: StudyOptions) -> list[SingleRobotTask]:
             level.draw(scenario, options.seed)
         except SettingsError as error:
             raise SettingsError(f"scenario '{name}': {error}") from None
-        digests[name] = hashlib.sha256(scenario.text.encode()).hexdigest()[:16]
+        digests[name] = digest(scenario)
     return [
         SingleRobotTask(
             name,

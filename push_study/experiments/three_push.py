@@ -3,7 +3,6 @@
 The thesis makes three pushes of it. How many there are is left to the planner, which needs fewer.
 """
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +19,7 @@ from push_model import se2
 from push_model.settings import SettingsError
 from push_ros.claims import own_domain
 from push_scenario.scenario import load_scenario
-from push_study.job import run_job
+from push_study.job import digest, run_job
 from push_study.pool import Row
 from push_study.study import StudyOptions
 from push_study.uncertainty import uncertainty
@@ -64,9 +63,9 @@ def tasks(options: StudyOptions) -> list[ThreePushTask]:
         scenario = load_scenario(name)
         if scenario.goal is None:
             raise SettingsError(f"scenario '{name}' has no goal")
-        digest = hashlib.sha256(scenario.text.encode()).hexdigest()[:16]
+        text = digest(scenario)
         made += [
-            ThreePushTask(name, seed, str(options.out), variant, options.uncertainty, digest)
+            ThreePushTask(name, seed, str(options.out), variant, options.uncertainty, text)
             for variant in VARIANTS
             for seed in range(options.seed, options.seed + options.trials)
         ]

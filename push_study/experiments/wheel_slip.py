@@ -4,7 +4,6 @@ Case I: the robot alone. II: with its 3 kg box, which the controller does not kn
 controller believes the wheels' friction to be 0.7, it is 0.5.
 """
 
-import hashlib
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -36,6 +35,7 @@ from push_ros.conversions import poses_from_ros, time_from_ros, trajectory_to_ro
 from push_ros.process import Spinner, prepare_environment
 from push_ros.qos import STATUS, STREAM
 from push_scenario.scenario import Scenario, load_scenario
+from push_study.job import digest
 from push_study.pool import Row
 from push_study.study import StudyOptions
 
@@ -97,9 +97,9 @@ def tasks(options: StudyOptions) -> list[SlipTask]:
         scenario = load_scenario(name)
         if not isinstance(scenario.robot()[1].drive, TorqueDrive):
             raise SettingsError(f"scenario '{name}': the robot is not driven by wheel torques")
-        digest = hashlib.sha256(scenario.text.encode()).hexdigest()[:16]
+        text = digest(scenario)
         made += [
-            SlipTask(name, seed, str(options.out), case, constraint, digest)
+            SlipTask(name, seed, str(options.out), case, constraint, text)
             for case in CASES
             for seed in range(options.seed, options.seed + options.trials)
             for constraint in (True, False)

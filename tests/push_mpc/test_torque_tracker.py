@@ -137,3 +137,12 @@ def test_failed_solves_mean_standing_and_in_a_row_the_end(monkeypatch):
     assert [t.torques is None for t in ticks] == [False] + 3 * [True] + [False] + 4 * [True]
     assert [t.finished for t in ticks] == 8 * [False] + [True]
     assert ticks[-1].code is TrackError.SOLVER_FAILED and ticks[-1].message == "broken"
+
+
+def test_the_reference_waits_while_there_are_no_poses():
+    tracker = tracker_of()
+    tracker.start(line(np.zeros(3), 3.0, 0.5, 0.5))
+    tracker.tick(DT, np.zeros(3))
+    before = tracker.reference()[0, 0]
+    tick = tracker.tick(4.0, np.zeros(3))  # four seconds of silence
+    assert not tick.finished and tracker.reference()[0, 0] - before < 0.05
