@@ -54,11 +54,13 @@ class PushStep:
 
 
 @dataclass
-class _Node:
+class SearchNode:
+    """An object pose, by its number in the graph, and the side that is pushed there."""
+
     pose: int
     side: int  # on which the push that starts here pushes; -1 at the goal
     cost: float  # g of (2.10)
-    parent: "_Node | None" = None
+    parent: "SearchNode | None" = None
     step: PushStep | None = None
     estimates: Array | None = None  # of the pushes that end here
     states: NDArray[np.int64] | None = None
@@ -220,7 +222,7 @@ class PushSearch:
             return
         self._try_single_push(statistics)
         counter = itertools.count()
-        queue = [(estimate, next(counter), _Node(len(graph.poses) - 1, -1, 0.0))]
+        queue = [(estimate, next(counter), SearchNode(len(graph.poses) - 1, -1, 0.0))]
         cheapest: dict[tuple[int, int], float] = {}
         settled: set[tuple[int, int]] = set()
         while queue and self.expanded < self.expansions:
@@ -231,7 +233,7 @@ class PushSearch:
                     continue
                 settled.add(key)
                 if node.pose == 0:
-                    self.solution, self.cost = _trace(node), node.cost
+                    self.solution, self.cost = trace(node), node.cost
                     return
                 node.estimates, node.states = graph.pushes_into(
                     node.pose, node.side, node.cost, self.weight, self.bound, ready
@@ -262,7 +264,7 @@ class PushSearch:
             if plain < self.bound and cost < cheapest.get((pose, side), math.inf):
                 cheapest[pose, side] = cost
                 statistics.generated += 1
-                child = _Node(pose, side, cost, node, step)
+                child = SearchNode(pose, side, cost, node, step)
                 heapq.heappush(queue, (total, next(counter), child))
         self.exhausted = not queue
 
@@ -278,7 +280,8 @@ class PushSearch:
                         self.solution, self.cost, self.bound = (step,), cost, cost
 
 
-def _trace(node: _Node) -> tuple[PushStep, ...]:
+def trace(node: SearchNode) -> tuple[PushStep, ...]:
+    """The pushes from a node to the goal, in their order."""
     steps = []
     while node.parent is not None:
         assert node.step is not None

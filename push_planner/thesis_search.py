@@ -14,7 +14,7 @@ import numpy as np
 from push_model import se2
 from push_planner.candidate_poses import Candidates
 from push_planner.guide_path import GuidePath, waypoints
-from push_planner.push_search import PushGraph, PushStep, SearchStatistics
+from push_planner.push_search import PushGraph, PushStep, SearchNode, SearchStatistics, trace
 from push_planner.scene import PushScene
 
 _SLICE = 20  # pushes tried between two reports
@@ -38,15 +38,6 @@ def poses_on(scene: PushScene, guide: GuidePath) -> Candidates:
 
 
 @dataclass
-class _Node:
-    pose: int
-    side: int  # on which the push that starts here pushes; -1 at the goal
-    cost: float  # g of (2.10)
-    parent: "_Node | None" = None
-    step: PushStep | None = None
-
-
-@dataclass
 class ThesisSearch:
     """``run`` yields now and then, and ends with the first solution of Algorithm 1.
 
@@ -65,12 +56,12 @@ class ThesisSearch:
         graph = self.graph
         counter = itertools.count()
         goal = len(graph.poses) - 1
-        queue = [(float(graph.way[goal]), next(counter), _Node(goal, -1, 0.0))]
+        queue = [(float(graph.way[goal]), next(counter), SearchNode(goal, -1, 0.0))]
         cheapest: dict[tuple[int, int], float] = {}
         while queue:
             _, _, node = heapq.heappop(queue)
             if node.pose == 0:
-                self.solution, self.cost = _trace(node), node.cost
+                self.solution, self.cost = trace(node), node.cost
                 return
             if node.cost > cheapest.get((node.pose, node.side), math.inf):
                 continue
@@ -87,7 +78,9 @@ class ThesisSearch:
                 guess = child.cost + float(graph.way[child.pose])  # (2.9), (2.11)
                 heapq.heappush(queue, (guess, next(counter), child))
 
-    def _successors(self, node: _Node, statistics: SearchStatistics) -> Iterator[_Node | None]:
+    def _successors(
+        self, node: SearchNode, statistics: SearchStatistics
+    ) -> Iterator[SearchNode | None]:
         """Algorithm 2: from the first place on Gamma from which a push leads to the node's pose.
 
         None for a push that there is not.
@@ -107,20 +100,11 @@ class ThesisSearch:
                     continue
                 found = here
                 cost = node.cost + step.curve.length + self._change(node, side)
-                yield _Node(pose, side, cost, node, step)
+                yield SearchNode(pose, side, cost, node, step)
 
-    def _change(self, node: _Node, side: int) -> float:
+    def _change(self, node: SearchNode, side: int) -> float:
         """[m] between the robot's places before and after a change of side, Figure 2.3."""
         if node.side in (-1, side):
             return 0.0
         robots = self.graph.robots[:, node.pose, :2]
         return float(np.hypot(*(robots[node.side] - robots[side])))
-
-
-def _trace(node: _Node) -> tuple[PushStep, ...]:
-    steps = []
-    while node.parent is not None:
-        assert node.step is not None
-        steps.append(node.step)
-        node = node.parent
-    return tuple(steps)
