@@ -13,7 +13,7 @@ from push_ros.process import die_with_parent, prepare_environment
 
 _GRACE = 2.5  # [s] after SIGINT, then SIGTERM
 _MOST_DEATHS = 5  # of one node, until it is not started again
-_LAST = 1.5  # [s] after SIGTERM, then SIGKILL
+_LAST = 0.8  # [s] after SIGTERM, then SIGKILL
 _TAIL = 600  # [characters] of what a dead node said
 
 
@@ -155,7 +155,7 @@ class Launcher:
         for number, limit in (
             (signal.SIGINT, _GRACE),
             (signal.SIGTERM, _LAST),
-            (signal.SIGKILL, 1.0),
+            (signal.SIGKILL, 0.7),
         ):
             alive = [c for c in self.children if c.process and c.process.poll() is None]
             for child in alive:

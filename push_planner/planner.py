@@ -198,7 +198,7 @@ class PushPlanner:
         goal = np.array([goal[0], goal[1], se2.wrap(goal[2])])
         self.check(start, "start", PlanError.START_OCCUPIED)
         self.check(goal, "goal", PlanError.GOAL_OCCUPIED)
-        self._check_room(start, "pushed away from the start")
+        self._check_room(start, "pushed away from the start", True)
         self._check_room(goal, "pushed into the goal")
         ends = start, goal
         start, goal = (self.scene.item.mass_pose(pose) for pose in ends)
@@ -293,11 +293,11 @@ class PushPlanner:
         reach = max(_REACH[0] * self.settings.waypoint_spacing, _REACH[1] * spacing)
         return PushGraph(scene, start, goal, candidates.free(scene), reach)
 
-    def _check_room(self, pose: Array, what: str) -> None:
+    def _check_room(self, pose: Array, what: str, leaving: bool = False) -> None:
         """Raise PlanningFailed when the object can be pushed on no side at the pose ``(3,)``."""
         centre = self.scene.item.mass_pose(pose)
         where = f"({pose[0]:.3f}, {pose[1]:.3f}, {pose[2]:.3f})"
-        needed = self.settings.safety_distance
+        needed = self.scene.leaving(centre) if leaving else self.settings.safety_distance
         clearance = self.scene.object_clearance(centre)
         if clearance < needed:
             raise PlanningFailed(
@@ -311,15 +311,14 @@ class PushPlanner:
                 PlanError.NO_PUSH_SEQUENCE,
                 f"no side of the object can be pushed: {self.scene.why_no_sides()}",
             )
-        if not any(self.scene.has_room(side.robot_pose(centre), side) for side in sides):
-            behind = ", ".join(
-                f"{side.index} ({1e3 * self.scene.back(side):.0f} mm)" for side in sides
-            )
+        if not any(self.scene.has_room(s.robot_pose(centre), s, needed) for s in sides):
+            behind = ", ".join(f"{s.index} ({1e3 * self.scene.back(s):.0f} mm)" for s in sides)
+            around = 1e3 * self.scene.robot_keeps(needed)
             raise PlanningFailed(
                 PlanError.NO_PUSH_SEQUENCE,
                 f"no side of the object can be {what} {where}: behind each that can be pushed the "
-                f"robot, which needs {1e3 * needed:.1f} mm around it and some way to back off, "
-                f"would touch an obstacle: sides {behind}",
+                f"robot, which needs {around:.1f} mm around it and some way to back off, would "
+                f"touch an obstacle: sides {behind}",
             )
 
     def _why_not(self, start: Array, goal: Array, work: "_Work") -> str:

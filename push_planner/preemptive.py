@@ -35,12 +35,12 @@ def preemptive_pushes(
     random = np.random.default_rng(seed)
     scene = planner.scene
     start, goal = scene.item.mass_pose(start), scene.item.mass_pose(goal)
-    needed = scene.settings.safety_distance
+    leaving, safe = scene.leaving(start), scene.settings.safety_distance
     found: list[tuple[float, PushSegment]] = []
     for side in scene.sides:
         drawn = random.uniform(0.95 * side.trusted.minimum, 0.95 * side.trusted.maximum, curvatures)
         begin = side.robot_pose(start)
-        if not scene.has_room(begin, side):
+        if not scene.has_room(begin, side, leaving):
             continue
         for curvature in [0.0, *drawn]:
             for length in lengths:
@@ -48,10 +48,10 @@ def preemptive_pushes(
                 curve = shortest_push_curve(begin, end, side.trusted.minimum, side.trusted.maximum)
                 if curve is None or not scene.has_room(end, side):
                     continue
-                clearance = scene.curve_clearance(curve, side, needed)
-                if clearance < needed:
-                    continue
                 after = se2.compose(end, side.grasp)
+                clearance = scene.kept(curve, side, leaving)
+                if clearance is None or scene.object_clearance(after) < safe:
+                    continue
                 gap = float(np.hypot(*(after - goal)[:2]))
                 step = PushStep(side, curve, start, after, clearance)
                 found.append((gap, planner.segment(step)))

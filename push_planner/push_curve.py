@@ -240,6 +240,32 @@ class PushCurve:
         heading = np.unwrap(np.arctan2(first[:, 1], first[:, 0]))
         return points, heading, kappa
 
+    def split(self, length: float) -> "tuple[PushCurve, PushCurve]":
+        """What comes before and after ``length`` [m], which is less than the curve's; to 1 mm or
+        so. Parts of a cubic are cubics."""
+        points, heading, _ = self.sample(_DENSE)
+        way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+        k = min(max(1, int(np.searchsorted(way, length))), _DENSE - 2)
+        s = k / (_DENSE - 1)
+        middle = np.array([*points[k], heading[k]])
+        slope = (self.end[:2] - self.start[:2]) * (6.0 * s * (1.0 - s))
+        for factor, size, angle in (
+            ((s - 1.0) * (3.0 * s - 1.0), self.k_start, self.start[2]),
+            (s * (3.0 * s - 2.0), self.k_end, self.end[2]),
+        ):
+            slope += factor * size * np.array([math.cos(angle), math.sin(angle)])
+        speed = float(np.hypot(*slope))
+        return (
+            PushCurve(self.start, middle, s * self.k_start, s * speed, float(way[k])),
+            PushCurve(
+                middle,
+                self.end,
+                (1.0 - s) * speed,
+                (1.0 - s) * self.k_end,
+                float(way[-1] - way[k]),
+            ),
+        )
+
 
 def shortest_push_curve(
     start: Array, end: Array, curvature_min: float, curvature_max: float

@@ -92,12 +92,17 @@ class PushGraph:
             position = self.poses[:, :2] + np.column_stack([c * x - s * y, s * x + c * y])
             robots.append(np.column_stack([position, heading, np.cos(heading), np.sin(heading)]))
         self.robots = np.array(robots)
+        self.leaving = scene.leaving(self.poses[0])
         self.room = np.array(
             [
                 scene.rooms(np.ascontiguousarray(r[:, :3]), side)
                 for r, side in zip(robots, scene.sides, strict=True)
             ]
         )
+        self.room[:, 0] = [
+            scene.has_room(r[0, :3], side, self.leaving)
+            for r, side in zip(robots, scene.sides, strict=True)
+        ]
         self.diameters = np.array(
             [[2.0 / s.trusted.maximum, -2.0 / s.trusted.minimum] for s in scene.sides]
         )
@@ -187,9 +192,9 @@ class PushGraph:
         curve = shortest_push_curve(start, end, side.trusted.minimum, side.trusted.maximum)
         if curve is None:
             return None
-        needed = self.scene.settings.safety_distance
-        clearance = self.scene.curve_clearance(curve, side, needed)
-        if clearance < needed:
+        leaving = self.leaving if first == 0 else math.inf
+        clearance = self.scene.kept(curve, side, leaving)
+        if clearance is None:
             return None
         return PushStep(side, curve, self.poses[first], self.poses[last], clearance)
 

@@ -24,7 +24,8 @@ import numpy as np
 
 from push_planner.distance_field import between_samples, lookup, piece_square, points_clearance
 
-_LOSS = 0.0005  # [m] by which the clearance of a push may be underestimated
+SWEEP_LOSS = 0.0005
+"""[m] by which the clearance of a push may be underestimated."""
 _COARSEST = 0.16  # [m] between the first poses that are looked at
 _FINEST = 20  # times that a stretch is halved at most
 _MOST = 2000  # poses of a push that are looked at; what is not sure by then counts as it is
@@ -79,8 +80,8 @@ def push_clearance(
 ) -> float:
     """Lower bound of the clearance [m] of robot and object on all of a push curve.
 
-    At most ``_LOSS`` less than at the poses looked at. Coarse ones come first, so that a push that
-    collides is found out early: stops at the first pose with less than ``needed``.
+    At most ``SWEEP_LOSS`` less than at the poses looked at. Coarse ones come first, so that a push
+    that collides is found out early: stops at the first pose with less than ``needed``.
     """
     dx, dy = end[0] - start[0], end[1] - start[1]
     ct, st = math.cos(start[2]), math.sin(start[2])
@@ -119,7 +120,7 @@ def push_clearance(
         if off >= 0.0:
             square = piece_square(a[7] * a[7], b[7] * b[7], gap * gap)
             low = max(0.0, math.sqrt(max(0.0, square)) - off)
-        if low >= least - _LOSS or top + 1 >= most or looked >= _MOST:
+        if low >= least - SWEEP_LOSS or top + 1 >= most or looked >= _MOST:
             bound = min(bound, low)
             top -= 1
             continue

@@ -4,6 +4,7 @@ Poses of the object are those of its centre of mass here, as in all of the plann
 borders: mechanics works about it, and there are fewer frames to mix up.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,10 +25,12 @@ from push_model.stable_push import (
 )
 from push_planner.distance_field import DistanceField, holds_obstacle, points_clearance
 from push_planner.push_curve import PushCurve
-from push_planner.push_sweep import push_clearance, rooms_behind
+from push_planner.push_sweep import SWEEP_LOSS, push_clearance, rooms_behind
 from push_planner.settings import PlannerSettings
 
 _OUTLINE_SPACING = 0.01  # [m] of points between which distances are interpolated
+_LEAVING = 0.15  # [m] of the first push, in which it may be nearer to obstacles than later
+_LEAST = 0.003  # [m] that the robot keeps even then
 
 
 @numba.njit(cache=True, fastmath=True)
@@ -156,6 +159,34 @@ class PushScene:
             )
         )
 
+    def leaving(self, pose: Array) -> float:
+        """[m] kept on the way out of a start pose ``(3,)``: all that there is, where that is less
+        than the safety distance. Somebody has put the object there."""
+        there = self.object_clearance(pose) - 1.2 * SWEEP_LOSS
+        return max(1e-4, min(self.settings.safety_distance, there))
+
+    def robot_keeps(self, leaving: float = math.inf) -> float:
+        """[m] that the robot keeps where it comes to contact; see ``leaving``."""
+        return min(self.settings.safety_distance, max(leaving, _LEAST))
+
+    def kept(self, curve: PushCurve, side: PushSide, leaving: float) -> float | None:
+        """[m] clearance of a push, None where it comes too near to an obstacle.
+
+        leaving: [m] that will do over the first centimetres; see the method.
+        """
+        needed = self.settings.safety_distance
+        if leaving >= needed:
+            clearance = self.curve_clearance(curve, side, needed)
+            return None if clearance < needed else clearance
+        first, rest = curve, None
+        if curve.length > _LEAVING:
+            first, rest = curve.split(_LEAVING)
+        clearance = self.curve_clearance(first, side, leaving)
+        if clearance < leaving:
+            return None
+        beyond = needed if rest is None else self.curve_clearance(rest, side, needed)
+        return None if beyond < needed else min(clearance, beyond)
+
     def back(self, side: PushSide) -> float:
         """[m] from contact with a side to where the robot may turn: out of a recess, and on."""
         return side.depth + self.settings.standoff
@@ -164,19 +195,24 @@ class PushScene:
         """Robot pose ``(3,)`` behind a contact pose, where an approach begins."""
         return se2.compose(contact_pose, np.array([-self.back(side), 0.0, 0.0]))
 
-    def rooms(self, contact_poses: Array, side: PushSide) -> NDArray[np.bool_]:
-        """Whether the robot can back off from (and so come to) contact poses ``(n, 3)``."""
+    def rooms(
+        self, contact_poses: Array, side: PushSide, leaving: float = math.inf
+    ) -> NDArray[np.bool_]:
+        """Whether the robot can back off from (and so come to) contact poses ``(n, 3)``.
+
+        leaving: [m] that the object has there, where that is less than the safety distance.
+        """
         result: NDArray[np.bool_] = rooms_behind(
             contact_poses,
             self.back(side),
             self.robot.footprint_radius,
-            self.settings.safety_distance,
+            self.robot_keeps(leaving),
             self.field.values,
             self._robot_points,
             *self.field.args,
         )
         return result
 
-    def has_room(self, contact_pose: Array, side: PushSide) -> bool:
+    def has_room(self, contact_pose: Array, side: PushSide, leaving: float = math.inf) -> bool:
         """``rooms`` of one contact pose ``(3,)``."""
-        return bool(self.rooms(contact_pose[None], side)[0])
+        return bool(self.rooms(contact_pose[None], side, leaving)[0])

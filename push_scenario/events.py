@@ -12,7 +12,8 @@ _LATEST = 1e6  # [s]
 
 @settings
 class Displace:
-    """An object or a robot is moved from where it is, at once and to rest."""
+    """An object or a robot is moved from where it is, at once and to rest, as far as nothing is in
+    its way: no hand pushes a body into another one."""
 
     kind: Literal["displace"] = field(default="displace", kw_only=True)
     at: float = bounded(low=0.0, high=_LATEST, doc="[s] of simulation time")
@@ -22,7 +23,7 @@ class Displace:
 
 @settings
 class Place:
-    """An object or a robot is put somewhere, at once and to rest."""
+    """An object or a robot is put somewhere, at once and to rest, unless something is there."""
 
     kind: Literal["place"] = field(default="place", kw_only=True)
     at: float = bounded(low=0.0, high=_LATEST, doc="[s] of simulation time")

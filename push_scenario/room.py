@@ -30,23 +30,22 @@ class Footprint:
     radius: float
     outline: Array | None
 
-    def meets(self, other: "Footprint") -> bool:
-        """Whether two bodies overlap by more than touching does."""
+    def meets(self, other: "Footprint", touch: float = _TOUCH) -> bool:
+        """Whether two bodies overlap by more than touching does, about ``touch`` [m]."""
         apart = float(np.hypot(*(self.centre - other.centre)))
-        if apart >= self.radius + other.radius - _TOUCH:
+        if apart >= self.radius + other.radius - touch:
             return False
         if self.outline is not None and other.outline is not None:
-            return overlap(self._shrunk, other.outline)
+            return overlap(self._shrunk(touch), other.outline)
         if self.outline is not None:
-            return overlaps_disc(self.outline, other.centre, other.radius - _TOUCH)
+            return overlaps_disc(self.outline, other.centre, other.radius - touch)
         if other.outline is not None:
-            return overlaps_disc(other.outline, self.centre, self.radius - _TOUCH)
+            return overlaps_disc(other.outline, self.centre, self.radius - touch)
         return True
 
-    @property
-    def _shrunk(self) -> Array:
+    def _shrunk(self, touch: float) -> Array:
         assert self.outline is not None
-        factor = max(0.0, 1.0 - _TOUCH / self.radius)
+        factor = max(0.0, 1.0 - touch / self.radius)
         shrunk: Array = self.centre + factor * (self.outline - self.centre)
         return shrunk
 
@@ -78,19 +77,22 @@ class Room:
             x0, x1, y0, y1 = environment.grid.extent
             self.low, self.high = np.array([x0, y0]), np.array([x1, y1])
 
-    def trouble(self, body: Footprint) -> str | None:
-        """Why a body cannot stand there: "outside the arena", "in box 2"; None when it can."""
+    def trouble(self, body: Footprint, touch: float = _TOUCH) -> str | None:
+        """Why a body cannot stand there: "outside the arena", "in box 2"; None when it can.
+
+        touch: [m] that counts as touching.
+        """
         if body.outline is None:
             low, high = body.centre - body.radius, body.centre + body.radius
         else:
             low, high = body.outline.min(axis=0), body.outline.max(axis=0)
-        if (low < self.low - _TOUCH).any() or (high > self.high + _TOUCH).any():
+        if (low < self.low - touch).any() or (high > self.high + touch).any():
             inside_at_all = (high > self.low).all() and (low < self.high).all()
             return "in the arena's wall" if inside_at_all else "outside the arena"
         for obstacle in self._obstacles:
-            if body.meets(obstacle):
+            if body.meets(obstacle, touch):
                 return f"in {obstacle.name}"
-        if isinstance(self._environment, MapSpec) and self._in_cells(body, low, high):
+        if isinstance(self._environment, MapSpec) and self._in_cells(body, low, high, touch):
             return "in an occupied or unknown cell of the map"
         return None
 
@@ -123,7 +125,7 @@ class Room:
         away: Array = (between_centres - math.sqrt(2.0)) * grid.resolution
         return away
 
-    def _in_cells(self, body: Footprint, low: Array, high: Array) -> bool:
+    def _in_cells(self, body: Footprint, low: Array, high: Array, touch: float) -> bool:
         assert isinstance(self._environment, MapSpec)
         grid = self._environment.grid
         size = np.array(grid.occupied.shape[::-1])
@@ -134,10 +136,10 @@ class Room:
         if not len(corners):
             return False
         if body.outline is not None:
-            return bool(cells_hit(body._shrunk, corners, grid.resolution).any())
+            return bool(cells_hit(body._shrunk(touch), corners, grid.resolution).any())
         nearest = np.clip(body.centre, corners, corners + grid.resolution)
         away = np.hypot(*(body.centre - nearest).T)
-        return bool((away < body.radius - _TOUCH).any())
+        return bool((away < body.radius - touch).any())
 
 
 def _obstacles(environment: EnvironmentSpec) -> list[Footprint]:

@@ -171,13 +171,23 @@ class LockstepRun:
         self.spinner.until(lambda: condition() or self.bridge.time > end, wall_limit)
         return condition()
 
-    def reach(self, goal: Array, sim_limit: float = 300.0, team: str = "") -> JobState | None:
+    def reach(
+        self,
+        goal: Array,
+        sim_limit: float = 300.0,
+        team: str = "",
+        meanwhile: Callable[["LockstepRun"], None] | None = None,
+    ) -> JobState | None:
         """Send a team a goal ``(3,)`` and wait until its job ends.
+
+        meanwhile: called as soon as the goal is sent; may spin this run.
 
         Returns its state then, or None after sim_limit [s] of sim time.
         """
         run = self.teams[team] if team else next(iter(self.teams.values()))
         run.send_goal(goal)
+        if meanwhile is not None:
+            meanwhile(self)
         return run.observer.state if self.spin_until(lambda: run.ended, sim_limit) else None
 
     def reach_all(

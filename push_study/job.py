@@ -38,13 +38,17 @@ def min_clearance(scenario: Scenario, trace: Trace) -> float:
 
 
 def run_job(
-    believed: Scenario, world: Scenario, extra: Callable[[], list[Node]] | None = None
+    believed: Scenario,
+    world: Scenario,
+    extra: Callable[[], list[Node]] | None = None,
+    meanwhile: Callable[[LockstepRun], None] | None = None,
 ) -> tuple[Row, Trace]:
     """Bring the object to the scenario's goal once; measures, and what was seen.
 
     Parameters
     ----------
     believed, world, extra: see ``LockstepRun``.
+    meanwhile: called as soon as the goal is sent; may spin the run.
 
     Raises
     ------
@@ -54,7 +58,7 @@ def run_job(
         raise ValueError(f"scenario '{believed.name}' has no goal")
     with LockstepRun(believed, extra, world=world, quiet=True) as run:
         run.start()
-        state = run.reach(believed.goal)
+        state = run.reach(believed.goal, meanwhile=meanwhile)
         trace = run.observer.trace
         duration = run.bridge.time
     position, orientation = final_errors(trace, believed.goal)

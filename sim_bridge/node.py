@@ -19,6 +19,8 @@ from push_ros.names import Names, space
 from push_ros.parameters import declare_settings
 from push_ros.process import run_node
 from push_ros.validation import FARTHEST
+from push_scenario.events import Event
+from push_scenario.footing import Footing
 from push_scenario.scenario import Scenario, load_scenario
 from sim_bridge.command_intake import CommandIntake
 from sim_bridge.disturbances import Disturbances, displace
@@ -94,7 +96,8 @@ class BridgeNode(Node):
         self.world = self._kind.make(s.environment, s.robots, s.objects, self._physics, self.period)
         self._steps = steps_of(self.period, self.world.time_step)
         self._capture = MotionCapture(self._capture_settings, self._seed)
-        self._disturbances = Disturbances(s.events, self._rate)
+        self._footing = Footing(s)
+        self._disturbances = Disturbances(s.events, self._rate, self._footing)
         self.outputs.scenario(s)
         late = self._capture.delay * self.period
         wall = math.inf if self.settings.lockstep else self.settings.command_timeout_wall
@@ -139,6 +142,10 @@ class BridgeNode(Node):
         self.running = True
         if self.settings.lockstep:
             self._advance()
+
+    def disturb(self, event: Event) -> None:
+        """Let something happen besides the scenario's events: now, or when its time comes."""
+        self._disturbances.add(event)
 
     def _on_timer(self) -> None:
         if self._paused:
@@ -246,7 +253,7 @@ class BridgeNode(Node):
                 place = compose(self.world.poses()[request.name], place)
             if not np.abs(place).max() <= FARTHEST:
                 raise SettingsError(f"{place.tolist()} is not a plausible pose")
-            response.message = displace(self.world, request.name, place)
+            response.message = displace(self.world, request.name, place, self._footing)
             response.success = True
         except SettingsError as error:
             response.success, response.message = False, str(error)

@@ -1,20 +1,24 @@
 """Somebody moves the box in mid-push: what the supervisor makes of it, in the nine scenarios."""
 
 import zlib
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from push_model.arrays import Array
 from push_model.settings import SettingsError
 from push_ros.claims import own_domain
 from push_scenario.events import Displace
+from push_scenario.footing import Footing
 from push_scenario.scenario import Scenario, load_scenario
 from push_study.experiments.single_robot import SCENARIOS as NINE
+from push_study.graph_run import LockstepRun
 from push_study.job import digest, run_job
 from push_study.pool import Row
 from push_study.study import StudyOptions
 from push_study.uncertainty import uncertainty
+from push_supervisor.machine import State
 
 SCENARIOS = NINE
 """Where none are named."""
@@ -23,7 +27,8 @@ FAR, TURN = 0.04, 0.12
 """[m], [rad] by which the box is moved at most."""
 POSITION, ORIENTATION = 0.01, 0.05
 """[m], [rad] within which a trial succeeds."""
-_WHEN = (12.0, 30.0)  # [s] of sim time: the first push lasts from about 8 s on
+_WHEN = (12.0, 30.0)  # [s] of sim time from which on; the first push begins at about 8 s
+_PATIENCE = 300.0  # [s] of sim time
 
 
 @dataclass(frozen=True)
@@ -52,16 +57,41 @@ def tasks(options: StudyOptions) -> list[DisplacedTask]:
     return made
 
 
-def disturbance(scenario: Scenario, seed: int) -> Displace:
-    """Of a trial: when, where to, how far turned."""
-    random = np.random.default_rng([seed, zlib.crc32(scenario.name.encode()), 7])
-    angle, far = random.uniform(-np.pi, np.pi), FAR * np.sqrt(random.uniform())
-    by = (
-        float(far * np.cos(angle)),
-        float(far * np.sin(angle)),
-        float(random.uniform(-TURN, TURN)),
-    )
-    return Displace(float(random.uniform(*_WHEN)), scenario.object()[0], by)
+class Hand:
+    """Moves the object once, while it is pushed; to where nothing else is, and on a free way.
+
+    moved: what it did, None as long as it has done nothing.
+    """
+
+    def __init__(self, scenario: Scenario, seed: int) -> None:
+        self.item = scenario.object()[0]
+        self.moved: Displace | None = None
+        self._footing = Footing(scenario)
+        self._random = np.random.default_rng([seed, zlib.crc32(scenario.name.encode()), 7])
+        self._at = float(self._random.uniform(*_WHEN))
+
+    def __call__(self, run: LockstepRun) -> None:
+        """Wait for the moment, and move it."""
+
+        def due() -> bool:
+            pushing = run.supervisor.machine.state is State.PUSHING
+            return run.bridge.time >= self._at and pushing
+
+        team = next(iter(run.teams.values()))
+        run.spin_until(lambda: due() or team.ended, _PATIENCE)
+        if due():
+            by = self.draw(run.bridge.world.poses())
+            self.moved = Displace(at=run.bridge.time, body=self.item, by=by)
+            run.bridge.disturb(self.moved)
+
+    def draw(self, poses: Mapping[str, Array]) -> tuple[float, float, float]:
+        """dx, dy, dtheta [m, m, rad], evenly over those that poses ``(3,)`` of all bodies leave."""
+        while True:
+            angle, far = self._random.uniform(-np.pi, np.pi), FAR * np.sqrt(self._random.uniform())
+            turn = self._random.uniform(-TURN, TURN)
+            by = np.array([far * np.cos(angle), far * np.sin(angle), turn])
+            if self._footing.along(self.item, by, poses)[1] is None:
+                return float(by[0]), float(by[1]), float(by[2])
 
 
 def trial(task: DisplacedTask) -> Row:
@@ -69,19 +99,18 @@ def trial(task: DisplacedTask) -> Row:
     with own_domain():
         scenario = load_scenario(task.scenario)
         believed, world, drawn = uncertainty(task.uncertainty).draw(scenario, task.seed)
-        event = disturbance(scenario, task.seed)
-        measures, _ = run_job(believed, replace(world, events=(event,)))
+        hand = Hand(world, task.seed)
+        measures, _ = run_job(believed, world, meanwhile=hand)
     close = measures["position_error_m"] <= POSITION
     close &= measures["orientation_error_rad"] <= ORIENTATION
-    return {
-        "scenario": task.scenario,
-        "seed": task.seed,
-        **measures,
+    row = {"scenario": task.scenario, "seed": task.seed, **measures, **drawn}
+    if hand.moved is None:
+        return row | {"success": False, "reason": f"not moved; {measures['reason']}"}
+    return row | {
         "success": bool(measures["success"] and close),
-        "displaced_m": float(np.hypot(*event.by[:2])),
-        "displaced_rad": abs(float(event.by[2])),
-        "displaced_at_s": event.at,
-        **drawn,
+        "displaced_m": float(np.hypot(*hand.moved.by[:2])),
+        "displaced_rad": abs(float(hand.moved.by[2])),
+        "displaced_at_s": hand.moved.at,
     }
 
 

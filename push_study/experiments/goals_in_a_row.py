@@ -23,7 +23,6 @@ GOALS = 56
 """Of a trial."""
 POSITION, ORIENTATION = 0.01, 0.05
 """[m], [rad] within which each must end."""
-_ROOM = 0.08  # [m] that the object has around it at a goal, so that a robot can come to every side
 
 
 @dataclass(frozen=True)
@@ -51,7 +50,11 @@ def tasks(options: StudyOptions) -> list[RowTask]:
 
 
 def draw_goals(scenario: Scenario, count: int, seed: int) -> list[Array]:
-    """Poses ``(3,)`` anywhere on the map where the object has room around it."""
+    """Poses ``(3,)`` anywhere on the map where the robot has room behind every side.
+
+    From others there may be no way on: a robot that can only push never gets an object out of a
+    corner.
+    """
     item = scenario.object()[1]
     field = DistanceField(scenario.grid)
     scene = PushScene(field, scenario.robot()[1], item, PlannerSettings())
@@ -60,7 +63,9 @@ def draw_goals(scenario: Scenario, count: int, seed: int) -> list[Array]:
     goals: list[Array] = []
     while len(goals) < count:
         pose = random.uniform([x0, y0, -np.pi], [x1, y1, np.pi])
-        if scene.object_clearance(item.mass_pose(pose)) >= _ROOM:
+        centre = item.mass_pose(pose)
+        free = scene.object_clearance(centre) >= scene.settings.safety_distance
+        if free and all(scene.has_room(side.robot_pose(centre), side) for side in scene.sides):
             goals.append(pose)
     return goals
 

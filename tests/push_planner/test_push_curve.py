@@ -130,3 +130,25 @@ def test_straight_push_is_straight():
 def test_limits_must_enclose_zero():
     with pytest.raises(ValueError, match="enclose 0"):
         shortest_push_curve(np.zeros(3), np.ones(3), 0.1, 0.2)
+
+
+@given(starts, st.floats(0.2, 1.5), angles, angles, st.floats(0.05, 1.0))
+@settings(deadline=None)
+def test_the_parts_of_a_curve_are_the_curve(start, distance, bearing, turn, part):
+    curve = shortest_push_curve(start, finish(start, distance, bearing, turn), -5.0, 5.0)
+    if curve is None:
+        return
+    first, rest = curve.split(part * curve.length)
+    assert first.length + rest.length == pytest.approx(curve.length, rel=1e-3)
+    assert first.length == pytest.approx(part * curve.length, abs=0.01 * curve.length)
+    whole, _, kappa = curve.sample(4001)
+    points, heading, _ = (
+        np.concatenate(pair) for pair in zip(first.sample(50), rest.sample(50), strict=True)
+    )
+    gaps = np.hypot(*(points[:, None] - whole[None]).transpose(2, 0, 1)).min(axis=1)
+    assert gaps.max() < 1e-3 * curve.length
+    assert points[49] == pytest.approx(points[50]) and heading[49] == pytest.approx(heading[50])
+    assert points[-1] == pytest.approx(curve.end[:2])
+    for piece in (first, rest):
+        _, _, k = piece.sample(200)
+        assert k.max() < kappa.max() + 1e-2 and k.min() > kappa.min() - 1e-2

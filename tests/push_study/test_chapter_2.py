@@ -90,14 +90,22 @@ def test_a_box_that_is_moved_in_mid_push_comes_to_its_goal_all_the_same(tmp_path
     assert "1 of 1 within 10 mm" in capsys.readouterr().out
 
 
-def test_disturbances_fill_their_ranges_and_differ_between_scenarios():
-    events = [displaced.disturbance(load_scenario("env1-target1"), s) for s in range(300)]
-    far = np.array([np.hypot(*e.by[:2]) for e in events])
-    turn = np.array([e.by[2] for e in events])
-    assert far.max() <= displaced.FAR and far.max() > 0.039 and np.abs(turn).max() > 0.115
-    assert {e.body for e in events} == {"box"} and min(e.at for e in events) >= 12.0
-    other = displaced.disturbance(load_scenario("env1-target2"), 0)
-    assert other.by != events[0].by
+def test_disturbances_fill_their_ranges_where_the_robot_lets_them():
+    """300 draws for a box at the bumper: none of them leads into the robot."""
+    scenario = load_scenario("env1-target1")
+    robot, box = scenario.robots["epuck1"][0], scenario.objects["box"][0]
+    poses = {"epuck1": np.zeros(3), "box": np.array([robot.push_distance + 0.045, 0.0, 0.0])}
+    hand = displaced.Hand(scenario, 1)
+    by = np.array([hand.draw(poses) for _ in range(300)])
+    far, front = np.hypot(*by[:, :2].T), robot.push_distance
+    assert far.max() <= displaced.FAR and far.max() > 0.039
+    assert by[:, 2].max() > 0.115 and by[:, 2].min() < -0.115
+    for dx, dy, turn in by:
+        outline = se2.transform(poses["box"] + [dx, dy, turn], box.outline)
+        beside = np.abs(outline[:, 1]) > robot.flat_bumper.width / 2
+        assert (beside | (outline[:, 0] > front - 2e-3)).all()
+    other = displaced.Hand(load_scenario("env1-target2"), 1)
+    assert other.draw(poses) != tuple(by[0])
 
 
 def test_goals_in_a_row_are_reached_without_a_reset(tmp_path, capsys):
@@ -108,6 +116,7 @@ def test_goals_in_a_row_are_reached_without_a_reset(tmp_path, capsys):
     goals_in_a_row.conclude(StudyOptions(("env3-target1",), 1, 2, tmp_path), [task], [row])
     assert "0 of 56 goals missed" in capsys.readouterr().out
     scenario = load_scenario("env3-target1")
-    for goal in goals_in_a_row.draw_goals(scenario, 100, 3):
-        outline = se2.transform(goal, scenario.object()[1].outline)
-        assert np.abs(outline[:, 0]).max() < 1.43 and np.abs(outline[:, 1]).max() < 0.93
+    goals = np.array(goals_in_a_row.draw_goals(scenario, 100, 3))
+    # A robot and its stand-off fit behind the box, wherever its side looks to.
+    assert np.abs(goals[:, 0]).max() < 1.5 - 0.14 and np.abs(goals[:, 1]).max() < 1.0 - 0.14
+    assert np.ptp(goals[:, 0]) > 2.3 and np.ptp(goals[:, 1]) > 1.3

@@ -253,4 +253,4 @@ def test_a_disc_reaches_into_a_concave_object():
 
 
 def test_an_unknown_event_body_does_nothing(robot):
-    assert Disturbances((), 100.0).apply(5, None, None) == []
+    assert Disturbances((), 100.0, None).apply(5, None, None) == []

@@ -260,6 +260,26 @@ def test_events_kill_remove_move_and_hide_bodies_at_their_times():
         assert bridge.world.poses()["d2"][0] == pytest.approx(0.6)
 
 
+def test_a_body_that_is_moved_into_another_stops_there_and_throws_nobody():
+    """A box shoved on to a disc, which stands, ends beside it; both stay where they are."""
+    shove = {"kind": "displace", "at": 0.2, "body": "box", "by": [0.3, -0.6, 0.0]}
+    put = {"kind": "place", "at": 0.3, "body": "box", "pose": [0.9, 0.02, 0.0]}
+
+    def still(poses, seconds):
+        return np.zeros((len(poses), 3))
+
+    values = {**discs(), "events": [shove, put]}
+    with running(values, lambda b: [Commander(THREE, still)]) as ((bridge, _), spinner):
+        run_until(bridge, spinner, 0.22)
+        beside = bridge.world.poses()["box"].copy()
+        run_until(bridge, spinner, 0.6)
+        poses = bridge.world.poses()
+        assert 0.05 < beside[1] < 0.2 and beside[0] == pytest.approx(0.25, abs=0.05)
+        assert poses["box"] == pytest.approx(beside, abs=1e-3)
+        for i, name in enumerate(THREE, 1):
+            assert poses[name][:2] == pytest.approx([0.3 * i, 0.0], abs=1e-3)
+
+
 def test_the_scenario_is_latched_and_a_service_displaces_bodies():
     def make(bridge):
         return [Commander(THREE, ahead), Onlooker()]
@@ -286,6 +306,10 @@ def test_the_scenario_is_latched_and_a_service_displaces_bodies():
             [0.5 + 0.1 * np.cos(4.0), -0.7 + 0.1 * np.sin(4.0)], abs=1e-3
         )
         assert not ask(name="moon").success and not ask(name="box", x=float("nan")).success
+        there = bridge.world.poses()["box"].copy()
+        refusal = ask(name="box", x=bridge.world.poses()["d2"][0], y=0.01)
+        assert not refusal.success and "it would be in d2" in refusal.message
+        assert bridge.world.poses()["box"] == pytest.approx(there, abs=1e-5)
         assert not np.array_equal(before, pose)
         # tf is what motion capture saw, with its noise and of its time
         truth = {time_from_ros(m.header.stamp): m for m in me.truth}
