@@ -1,12 +1,13 @@
 """One LTV-MPC step by QP backend, easy and hard cases, against a reference solved to 1e-10.
 
-Every rival is measured with the same rows and the same warm start as ours: rows as they are needed,
-checked and written by the same compiled code, and every row at once; each starts from what it
-found the tick before, and anew where a closed loop begins.
+The hard cases are solved with contact forces too (section 2.4.6): "forces". Every rival is measured
+with the same rows and the same warm start as ours: rows as they are needed, checked and written by
+the same compiled code, and every row at once; each starts from what it found the tick before, and
+anew where a closed loop begins.
 """
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -14,15 +15,53 @@ import numpy as np
 
 from benchmarks.measure import at_least, at_most, quantiles, thread_times
 from push_model import CurvatureLimits, DifferentialDrive, unicycle_step
-from push_mpc import Contact, LtvMpc, MpcSettings, Reference
+from push_mpc import (
+    Contact,
+    ContactForceMpc,
+    ContactForceSettings,
+    LtvMpc,
+    MpcSettings,
+    Reference,
+    line_contact,
+)
+from push_planner import push_sides
 from push_qp import ActiveSetBackend, DaqpBackend, OsqpBackend, Qp, QpBackend, QpSolution
+from push_scenario.scenario import load_scenario
 
 DRIVE = DifferentialDrive(0.0205, 0.0265, 6.28)
 LIMITS = Contact(CurvatureLimits(-1.8, 1.8))
-UNBOUNDED = replace(
-    MpcSettings(), max_wheel_slack=100.0, max_curvature_slack=100.0, max_obstacle_slack=100.0
+UNBOUNDED, FORCES = (
+    replace(s, max_wheel_slack=100.0, max_curvature_slack=100.0, max_obstacle_slack=100.0)
+    for s in (MpcSettings(), ContactForceSettings())
 )
 LOOPS, TICKS = 12, 50  # closed loops, and ticks of each; 1 in 50 is a cold start
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What is measured: a controller with its contact, in easy or hard loops."""
+
+    controller: type[LtvMpc]
+    settings: Any
+    contact: Contact
+    hard: bool
+
+    def make(self, solver: Any = None) -> LtvMpc:
+        """A controller; its own solver where none is given."""
+        return self.controller(self.settings, DRIVE, solver)
+
+
+def kinds() -> dict[str, Kind]:
+    """By name."""
+    scenario = load_scenario("short")
+    robot, item = scenario.robot()[1], scenario.object()[1]
+    side = push_sides(robot, item, 1.0)[0]
+    forces = Contact(side.nominal, line_contact(robot, item, side.grasp))
+    return {
+        "easy": Kind(LtvMpc, UNBOUNDED, LIMITS, False),
+        "hard": Kind(LtvMpc, UNBOUNDED, LIMITS, True),
+        "forces": Kind(ContactForceMpc, FORCES, forces, True),
+    }
 
 
 class WrittenOut:
@@ -81,18 +120,19 @@ class Reference10:
         pass
 
 
-def cases(hard: bool) -> list[Any]:
+def cases(kind: Kind) -> list[Any]:
     """Consecutive ticks of closed loops at 100 Hz: error, reference, obstacles.
 
     Easy: near the reference, obstacles out of the way. Hard: from far off, on a bend near the
     curvature limit, obstacles close along the way on both sides. The obstacles are 20 each time.
     """
+    hard = kind.hard
     random = np.random.default_rng(7 if hard else 3)
     p, h = 20, 0.1
     result = []
     for _ in range(LOOPS):
         kappa = random.uniform(1.2, 1.7) * random.choice([-1, 1]) if hard else 0.3
-        mpc = LtvMpc(UNBOUNDED, DRIVE)
+        mpc = kind.make()
         aside = random.uniform(0.01, 0.025) if hard else 0.001
         state = np.array([-0.005, random.choice([-1, 1]) * aside, random.normal() * 0.1 * hard])
         v, omega = 0.05 if hard else 0.07, 0.0
@@ -115,7 +155,7 @@ def cases(hard: bool) -> list[Any]:
                 [c * d[0] + s * d[1], -s * d[0] + c * d[1], d[2], v - 0.07, omega - 0.07 * kappa]
             )
             result.append((error, Reference(pose, twist), circles, tick == 0))
-            answer = mpc.solve(error, Reference(pose, twist), LIMITS, circles)
+            answer = mpc.solve(error, Reference(pose, twist), kind.contact, circles)
             v = max(v + 0.01 * answer.acceleration[0], 0.0)
             omega += 0.01 * answer.acceleration[1]
             state = unicycle_step(state, v, omega, 0.01) + random.normal(size=3) * [
@@ -141,21 +181,20 @@ BACKENDS: dict[str, Callable[[], Any]] = {
 
 def run() -> dict[str, Any]:
     """Times, violations and first-input errors."""
-    settings = UNBOUNDED
     result: dict[str, Any] = {}
-    for kind in ("easy", "hard"):
-        inputs = cases(kind == "hard")
+    for label, kind in kinds().items():
+        inputs = cases(kind)
         sample = inputs[::10]
-        exact = [solve_fresh(Reference10(), settings, c)[0] for c in sample]
-        times = _interleaved(inputs)
+        exact = [solve_fresh(Reference10(), kind, c)[0] for c in sample]
+        times = _interleaved(kind, inputs)
         for name, make in BACKENDS.items():
             row = {
                 "median_s": float(np.median(times[name])),
                 "p99_s": float(np.percentile(times[name], 99)),
             }
-            text = f"  {kind:4s} {name:27s} {quantiles(times[name])}"
+            text = f"  {label:6s} {name:27s} {quantiles(times[name])}"
             if name != "no solver":
-                answers = [solve_fresh(make(), settings, case) for case in sample]
+                answers = [solve_fresh(make(), kind, case) for case in sample]
                 errors = [
                     float(np.abs((first - best) / [0.3, 6.0]).max())
                     for (first, _), best in zip(answers, exact, strict=True)
@@ -167,29 +206,29 @@ def run() -> dict[str, Any]:
                     f"{np.median(errors):.1e} max {max(errors):.1e}"
                 )
             print(text, flush=True)
-            result[f"{kind} {name}"] = row
+            result[f"{label} {name}"] = row
     result["bounds"] = _bounds(result)
     return result
 
 
-def _interleaved(inputs: list[Any]) -> dict[str, np.ndarray]:
+def _interleaved(kind: Kind, inputs: list[Any]) -> dict[str, np.ndarray]:
     """CPU time [s] of each step by backend; they take turns, a closed loop each.
 
     So that a machine that is slower for a while is slower for all. OSQP has three loops' turns.
     """
-    controllers = {name: LtvMpc(UNBOUNDED, DRIVE, make()) for name, make in BACKENDS.items()}
+    controllers = {name: kind.make(make()) for name, make in BACKENDS.items()}
     times: dict[str, list[np.ndarray]] = {name: [] for name in BACKENDS}
     for first in range(0, len(inputs), TICKS):
         for name, mpc in controllers.items():
             if "osqp" in name and first >= 3 * TICKS:
                 continue
             if first == 0:
-                mpc.solve(inputs[0][0], inputs[0][1], LIMITS, inputs[0][2])
+                mpc.solve(inputs[0][0], inputs[0][1], kind.contact, inputs[0][2])
 
             def step(case: Any, mpc: LtvMpc = mpc) -> Any:
                 if case[3]:
                     mpc.reset()
-                return mpc.solve(case[0], case[1], LIMITS, case[2])
+                return mpc.solve(case[0], case[1], kind.contact, case[2])
 
             times[name].append(thread_times(step, inputs[first : first + TICKS])[0])
     return {name: np.concatenate(parts) for name, parts in times.items()}
@@ -198,30 +237,40 @@ def _interleaved(inputs: list[Any]) -> dict[str, np.ndarray]:
 def _bounds(result: dict[str, Any]) -> dict[str, Any]:
     easy, hard = result["easy active set"], result["hard active set"]
 
-    def ratio(name: str, quantile: str) -> float:
-        """The least of easy and hard."""
+    def ratio(name: str, quantile: str = "median_s", of: Sequence[str] = ("easy", "hard")) -> float:
+        """The least of them."""
         return min(
             result[f"{kind} {name}"][quantile] / result[f"{kind} active set"][quantile]
-            for kind in ("easy", "hard")
+            for kind in of
         )
+
+    forces = result["forces active set"]
 
     return {
         "step median, easy [ms]": at_most(1e3 * easy["median_s"], 0.065),
         "step median, hard [ms]": at_most(1e3 * hard["median_s"], 0.115),
         "step p99 [ms]": at_most(1e3 * max(easy["p99_s"], hard["p99_s"]), 0.4),
         "OSQP 1e-5 with polish / ours, the same rows, median": at_least(
-            ratio("osqp 1e-5 polish", "median_s"), 4.0
+            ratio("osqp 1e-5 polish"), 4.0
         ),
-        "DAQP / ours, the same rows, median": at_least(ratio("daqp", "median_s"), 1.0),
+        "DAQP / ours, the same rows, median": at_least(ratio("daqp"), 1.0),
         "DAQP / ours, the same rows, p99": at_least(ratio("daqp", "p99_s"), 1.0),
-        "DAQP with every row / ours, median": at_least(ratio("daqp, every row", "median_s"), 1.0),
+        "DAQP with every row / ours, median": at_least(ratio("daqp, every row"), 1.0),
         "first-input error, hard, max": at_most(hard["first_input_error_max"], 1e-3),
+        "forces: step / that without forces, median": at_most(
+            forces["median_s"] / hard["median_s"], 20.0
+        ),
+        "forces: OSQP 1e-5 with polish / ours, the same rows, median": at_least(
+            ratio("osqp 1e-5 polish", of=("forces",)), 1.0
+        ),
+        "forces: DAQP / ours, the same rows, median": at_least(ratio("daqp", of=("forces",)), 1.0),
+        "forces: first-input error, max": at_most(forces["first_input_error_max"], 1e-3),
     }
 
 
-def solve_fresh(solver: QpBackend, settings: MpcSettings, case: Any) -> tuple[np.ndarray, float]:
+def solve_fresh(solver: QpBackend, kind: Kind, case: Any) -> tuple[np.ndarray, float]:
     """First input and worst violated row of a step without history."""
-    qp = LtvMpc(settings, DRIVE, solver).programme(case[0], case[1], LIMITS, case[2])
+    qp = kind.make(solver).programme(case[0], case[1], kind.contact, case[2])
     result = solver.solve(qp)
     if not result.solved:
         return np.full(2, np.nan), np.inf
