@@ -5,7 +5,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-NAMES = ("curve", "mpc", "nmpc", "plan", "latency", "lockstep", "physics", "stable-push")
+NAMES = ("curve", "grasp", "mpc", "nmpc", "plan", "latency", "lockstep", "physics", "stable-push")
 """Modules of this package with a ``run``; a dash for each underscore."""
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from push_model.arrays import Array
 from push_model.settings import SettingsError, bounded, from_mapping, settings
 from push_model.specs import ObjectSpec, RobotSpec
-from push_scenario.files import read_named
+from push_scenario.files import find, read_named, read_yaml
 from push_scenario.placements import Placement
 from push_scenario.poses import PoseValue, to_array
 from push_scenario.room import Room, object_footprint, robot_footprint
@@ -83,6 +83,18 @@ def read_groups(
         names = (name,) if count is None else tuple(f"{name}{i + 1}" for i in range(count))
         groups.append(Group(name, names, made, entry, here))
     return groups
+
+
+def load_object(name: str) -> ObjectSpec:
+    """An object type by its name in config/objects or a path; raises SettingsError."""
+    path = find("objects", name)
+    return from_mapping(ObjectSpec, read_yaml(path), str(path))
+
+
+def load_robot(name: str) -> RobotSpec:
+    """A robot type by its name in config/robots or a path; raises SettingsError."""
+    path = find("robots", name)
+    return from_mapping(RobotSpec, read_yaml(path), str(path))
 
 
 def placed(

@@ -1,0 +1,1 @@
+"""A planar world: rigid bodies with Coulomb contacts, compiled."""
