@@ -5,7 +5,18 @@ import json
 from pathlib import Path
 from typing import Any
 
-NAMES = ("curve", "grasp", "mpc", "nmpc", "plan", "latency", "lockstep", "physics", "stable-push")
+NAMES = (
+    "curve",
+    "grasp",
+    "mpc",
+    "nmpc",
+    "plan",
+    "latency",
+    "lockstep",
+    "physics",
+    "stable-push",
+    "worlds",
+)
 """Modules of this package with a ``run``; a dash for each underscore."""
 
 
