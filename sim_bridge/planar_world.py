@@ -13,30 +13,27 @@ import numpy as np
 
 from push_model import se2
 from push_model.arrays import Array
-from push_model.bumpers import RingBumper
-from push_model.drives import HolonomicDrive, SpeedDrive
-from push_model.limit_surface import GRAVITY
+from push_model.drives import HolonomicDrive
 from push_model.occupancy import MapSpec
-from push_model.settings import SettingsError, bounded, settings
+from push_model.settings import bounded, settings
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
-from sim_bridge.planar.collide import Neighbours, Parts
-from sim_bridge.planar.shapes import Buckets, Part, PartTable, body_parts, fixed_parts
-from sim_bridge.planar.solve import (
-    HOLONOMIC,
-    OBJECT,
-    WHEELS,
-    Bodies,
-    Contacts,
-    Sums,
-    advance,
+from sim_bridge.planar.constraints import HOLONOMIC
+from sim_bridge.planar.shapes import Part, body_parts, fixed_parts
+from sim_bridge.planar.solve import advance
+from sim_bridge.planar.tables import (
+    make_bodies,
+    make_contacts,
+    make_parts,
+    make_sums,
+    object_row,
+    robot_parts,
+    robot_row,
 )
 from sim_bridge.world import BodyPoses, Contact, WheelState
 from sim_bridge.worlds import Objects, Robots, WorldKind, steps_of
 
-_ROBOT_FRICTION = 1.0  # as PyBullet's robots: that of a contact is what they touch
-_LARGE = 2.5  # times the median radius: parts that all others are held against
+_FEW = 12  # robots that are commanded one by one
 _CONTACTS = 8  # a part at most, on average
-_LEVER = 2.0 / 3.0  # of its radius at which a disc's traction turns it
 
 
 @settings
@@ -44,9 +41,9 @@ class PlanarSettings:
     """Step and solver of the planar world."""
 
     time_step: float = bounded(
-        2e-3, low=1e-4, high=2e-2, doc="[s] longest physics step; a tick is a whole number of them"
+        5e-3, low=1e-4, high=2e-2, doc="[s] longest physics step; a tick is a whole number of them"
     )
-    solver_iterations: int = bounded(60, low=5, high=1000, doc="turns of every contact at most")
+    solver_iterations: int = bounded(20, low=5, high=1000, doc="turns of every contact at most")
     tolerance: float = bounded(
         1e-3, low=0.0, high=1.0, doc="[N] change of a force below which turns end"
     )
@@ -72,30 +69,29 @@ class PlanarWorld:
         self._all = (*robots, *objects)
         self._rows = {name: i for i, name in enumerate(self._all)}
         self._robots = tuple(robots)
-        self._specs: dict[str, RobotSpec] = {n: spec for n, (spec, _) in robots.items()}
         self._starts = np.array(
             [start for _, start in [*robots.values(), *objects.values()]], dtype=np.float64
         ).reshape(-1, 3)
         parts: list[tuple[int, Part]] = []
         rows = []
         for i, (name, (robot, _)) in enumerate(robots.items()):
-            parts += [(i, part) for part in _robot_parts(robot)]
-            rows.append(_robot_row(name, robot))
+            parts += [(i, part) for part in robot_parts(robot)]
+            rows.append(robot_row(name, robot))
         for i, (item, _) in enumerate(objects.values(), len(robots)):
             outline = item.geometry.outline
             parts += [(i, part) for part in body_parts(outline, item.contact_friction)]
-            surface = item.limit_surface()
-            floor = (surface.max_force, surface.max_torque)
-            rows.append((OBJECT, item.mass, item.moment, floor, (0.0, 0.0), (0.0, 0.0), item.com))
+            rows.append(object_row(item))
         fixed = fixed_parts(environment)
         self._fixed_names = [name for name, _ in fixed]
-        self._bodies = _bodies(rows)
+        self._bodies = make_bodies(rows)
         self._centres = np.array([row[6] for row in rows], dtype=np.float64).reshape(-1, 2)
-        self._parts, self._near = _tables(parts, [part for _, part in fixed])
+        self._off_centre = bool(self._centres.any())
+        self._parts, self._near = make_parts(parts, [part for _, part in fixed])
         most = _CONTACTS * (len(parts) + 8)
-        self._contacts = _contacts(most)
-        self._sums = _sums(most)
-        self._limits = {n: r.drive for n, (r, _) in robots.items()}
+        self._contacts = make_contacts(most)
+        self._sums = make_sums(most)
+        self._drives = [robot.drive for robot, _ in robots.values()]
+        self._fastest = np.array([(d.max_speed, d.max_turn_rate) for d in self._drives])
         self._dead: set[str] = set()
         self.reset()
 
@@ -172,19 +168,38 @@ class PlanarWorld:
 
         Only robots that move in any direction heed the second column, and the world's frame.
         """
+        twists = np.asarray(twists, dtype=np.float64)
         if not np.isfinite(twists).all():
             raise ValueError("commands are not finite")
         b = self._bodies
-        for robot, (vx, vy, omega) in zip(robots, np.asarray(twists).tolist(), strict=True):
-            if robot in self._dead:
-                continue
-            row, drive = self._rows[robot], self._limits[robot]
-            if isinstance(drive, HolonomicDrive):
-                b.target[row] = drive.saturate(vx, vy, omega)
-                b.own_frame[row] = not fixed_frame
-            else:
-                v, turn = drive.saturate(vx, omega)
-                b.target[row] = v, 0.0, turn
+        if len(robots) <= _FEW:
+            for robot, twist in zip(robots, twists.tolist(), strict=True):
+                if robot not in self._dead:
+                    self._command_one(self._rows[robot], twist, fixed_frame)
+            return
+        rows = np.array([self._rows[robot] for robot in robots], dtype=np.int64)
+        if self._dead:
+            alive = np.array([robot not in self._dead for robot in robots], dtype=np.bool_)
+            rows, twists = rows[alive], twists[alive]
+        free = b.kind[rows] == HOLONOMIC
+        discs = rows[free]
+        if len(discs):
+            wanted, most = twists[free], self._fastest[discs]
+            need = np.maximum(
+                np.hypot(wanted[:, 0], wanted[:, 1]) / most[:, 0], np.abs(wanted[:, 2]) / most[:, 1]
+            )
+            b.target[discs] = wanted / np.maximum(need, 1.0)[:, None]
+            b.own_frame[discs] = not fixed_frame
+        for row, twist in zip(rows[~free].tolist(), twists[~free].tolist(), strict=True):
+            self._command_one(row, twist, fixed_frame)
+
+    def _command_one(self, row: int, twist: Sequence[float], fixed_frame: bool) -> None:
+        target, drive = self._bodies.target[row], self._drives[row]
+        if isinstance(drive, HolonomicDrive):
+            target[0], target[1], target[2] = drive.saturate(*twist)
+            self._bodies.own_frame[row] = not fixed_frame
+        else:
+            target[0], target[2] = drive.saturate(twist[0], twist[2])
 
     def command_torques(self, robot: str, left: float, right: float) -> None:
         """No robot of this world takes torques."""
@@ -234,13 +249,14 @@ class PlanarWorld:
 
     def poses(self) -> BodyPoses:
         """Ground truth of every body that is there."""
-        pose = self._bodies.pose[self._listed]
-        c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
-        dx, dy = self._centres[self._listed].T
-        heading = np.array([se2.wrap(a) for a in pose[:, 2].tolist()])
-        table = np.column_stack(
-            [pose[:, 0] - (c * dx - s * dy), pose[:, 1] - (s * dx + c * dy), heading]
-        )
+        table = self._bodies.pose[self._listed]
+        if self._off_centre:
+            c, s = np.cos(table[:, 2]), np.sin(table[:, 2])
+            dx, dy = self._centres[self._listed].T
+            table[:, 0] -= c * dx - s * dy
+            table[:, 1] -= s * dx + c * dy
+        turns = np.round(table[:, 2] / (2.0 * math.pi))
+        table[:, 2] -= 2.0 * math.pi * turns
         return BodyPoses(self._names, table)
 
     def velocity(self, name: str) -> Array:
@@ -262,126 +278,6 @@ class PlanarWorld:
         self._bodies.there[self._rows[name]] = False
         self._dead |= {name} & set(self._robots)
         self._list_bodies()
-
-
-_Row = tuple[
-    int, float, float, tuple[float, float], tuple[float, float], tuple[float, float], object
-]
-
-
-def _robot_parts(spec: RobotSpec) -> list[Part]:
-    """A disc, or the outline of a flat bumper's robot; about its centre of mass."""
-    centre = np.array([-spec.com_ahead, 0.0])
-    if isinstance(spec.bumper, RingBumper):
-        return [Part.disc(centre, spec.footprint_radius, _ROBOT_FRICTION)]
-    return body_parts(spec.outline + centre, _ROBOT_FRICTION)
-
-
-def _robot_row(name: str, spec: RobotSpec) -> _Row:
-    """Kind, mass, inertia, floor, what its drive can do, wheels, centre of mass."""
-    inertia = spec.inertia
-    if inertia is None:
-        inertia = 0.5 * spec.mass * spec.body_radius**2
-    com = (spec.com_ahead, 0.0)
-    drive = spec.drive
-    if isinstance(drive, HolonomicDrive):
-        spin = drive.max_force * _LEVER * spec.footprint_radius
-        return HOLONOMIC, spec.mass, inertia, (0.0, 0.0), (drive.max_force, spin), (0.0, 0.0), com
-    if isinstance(drive, SpeedDrive):
-        load = 0.5 * spec.mass * GRAVITY
-        most = (drive.wheel_friction * load, drive.wheel_torque / drive.wheel_radius)
-        track = (drive.half_track, spec.com_ahead)
-        return WHEELS, spec.mass, inertia, (0.0, 0.0), most, track, com
-    raise SettingsError(
-        f"{name}: the planar world has no wheels that are driven by torque; use bridge.world: "
-        "pybullet"
-    )
-
-
-def _bodies(rows: Sequence[_Row]) -> Bodies:
-    n = len(rows)
-    mass = np.array([row[1:3] for row in rows], dtype=np.float64).reshape(-1, 2)
-    return Bodies(
-        np.zeros((n, 3)),
-        np.zeros((n, 3)),
-        1.0 / mass,
-        np.array([row[0] for row in rows], dtype=np.int64),
-        np.ones(n, dtype=np.bool_),
-        np.array([row[3] for row in rows], dtype=np.float64).reshape(-1, 2),
-        np.zeros((n, 3)),
-        np.ones(n, dtype=np.bool_),
-        np.array([row[4] for row in rows], dtype=np.float64).reshape(-1, 2),
-        np.array([row[5] for row in rows], dtype=np.float64).reshape(-1, 2),
-        np.zeros((n, 4)),
-    )
-
-
-def _tables(parts: Sequence[tuple[int, Part]], fixed: Sequence[Part]) -> tuple[Parts, Neighbours]:
-    moving = len(parts)
-    table = PartTable.of([*parts, *((-1, part) for part in fixed)])
-    buckets = Buckets.of(PartTable.of([(-1, part) for part in fixed]))
-    radius = table.radius[:moving]
-    limit = _LARGE * float(np.median(radius)) if moving else 0.0
-    small = np.flatnonzero(radius <= limit)
-    size = float(radius[small].max()) if len(small) else 1.0
-    bits = max(4, math.ceil(math.log2(max(1, 2 * moving))))
-    return (
-        Parts(
-            moving,
-            table.body,
-            table.first,
-            table.count,
-            table.local,
-            table.radius,
-            table.friction,
-            table.vertices,
-            table.local.copy(),
-            table.vertices.copy(),
-            np.flatnonzero(radius > limit),
-            small,
-        ),
-        Neighbours(
-            np.full(1 << bits, -1, dtype=np.int64),
-            np.full(max(1, moving), -1, dtype=np.int64),
-            2.0 * size + 2e-3,
-            buckets.low,
-            buckets.size,
-            buckets.start,
-            buckets.items,
-            buckets.box,
-            buckets.spacing,
-            np.full(max(1, len(fixed)), -1, dtype=np.int64),
-        ),
-    )
-
-
-def _table(rows: int) -> Array:
-    """Empty, hashed, for so many rows."""
-    return np.full(1 << math.ceil(math.log2(4 * rows)), -1, dtype=np.int64)
-
-
-def _contacts(most: int) -> Contacts:
-    return Contacts(
-        np.zeros((most, 5), dtype=np.int64),
-        np.zeros((most, 6)),
-        np.zeros((most, 2)),
-        np.zeros((most, 6)),
-        np.zeros(most, dtype=np.int64),
-        np.zeros(most, dtype=np.int64),
-        np.zeros((most, 2)),
-        np.zeros(1, dtype=np.int64),
-        _table(most),
-    )
-
-
-def _sums(most: int) -> Sums:
-    return Sums(
-        np.zeros(most, dtype=np.int64),
-        np.zeros((most, 8)),
-        np.zeros(most, dtype=np.int64),
-        np.zeros(2, dtype=np.int64),
-        _table(most),
-    )
 
 
 def _make(

@@ -42,12 +42,14 @@ class Parts(NamedTuple):
 class Neighbours(NamedTuple):
     """How parts that may touch are found.
 
-    heads, following: a hashed grid of cells of ``spacing`` [m], the greatest diameter of the small
-    parts; low, size, start, items, box, cell: the fixed parts' Buckets; stamp: which part asked.
+    heads, following, cells ``(p, 2)``: a hashed grid of cells of ``spacing`` [m], the greatest
+    diameter of the small parts; low, size, start, items, box, cell: the fixed parts' Buckets;
+    stamp: which part asked.
     """
 
     heads: Any
     following: Any
+    cells: Any
     spacing: float
     low: Any
     size: Any
@@ -58,21 +60,20 @@ class Neighbours(NamedTuple):
     stamp: Any
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _add(
-    ints: Any, reals: Any, n: int, parts: Parts, pa: int, pb: int, feature: int,
+    ints: Any, reals: Any, n: int, body: Any, friction: Any, pa: int, pb: int, feature: int,
     nx: float, ny: float, px: float, py: float, gap: float,
 ) -> int:  # fmt: skip
     if n >= ints.shape[0]:
         return n
-    ints[n, 0], ints[n, 1] = parts.body[pa], parts.body[pb]
-    ints[n, 2], ints[n, 3], ints[n, 4] = pa, pb, feature
+    ints[n, 0], ints[n, 1], ints[n, 2], ints[n, 3], ints[n, 4] = body[pa], body[pb], pa, pb, feature
     reals[n, 0], reals[n, 1], reals[n, 2], reals[n, 3] = nx, ny, px, py
-    reals[n, 4], reals[n, 5] = gap, parts.friction[pa] * parts.friction[pb]
+    reals[n, 4], reals[n, 5] = gap, friction[pa] * friction[pb]
     return n + 1
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _discs(pa: int, pb: int, middles: Any, radius: Any, margin: float) -> Any:
     """Normal, point and gap of two discs; the gap is far where there is no contact."""
     dx, dy = middles[pa, 0] - middles[pb, 0], middles[pa, 1] - middles[pb, 1]
@@ -87,7 +88,7 @@ def _discs(pa: int, pb: int, middles: Any, radius: Any, margin: float) -> Any:
     return nx, ny, middles[pb, 0] + reach * nx, middles[pb, 1] + reach * ny, gap
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _disc_polygon(
     x: float, y: float, r: float, corners: Any, first: int, count: int, margin: float
 ) -> Any:
@@ -128,7 +129,7 @@ def _disc_polygon(
     return nx, ny, bx, by, d - r
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _apart(corners: Any, fa: int, na: int, fb: int, nb: int, margin: float) -> Any:
     """The edge of a from which b is farthest, and how far [m]."""
     best, edge = -_FAR, -1
@@ -151,10 +152,12 @@ def _apart(corners: Any, fa: int, na: int, fb: int, nb: int, margin: float) -> A
     return best, edge
 
 
-@numba.njit(cache=True)
-def _polygons(ints: Any, reals: Any, n: int, parts: Parts, pa: int, pb: int, margin: float) -> int:
+@numba.njit(cache=True, error_model="numpy")
+def _polygons(
+    ints: Any, reals: Any, n: int, body: Any, friction: Any, first: Any, count: Any, corners: Any,
+    pa: int, pb: int, margin: float,
+) -> int:  # fmt: skip
     """Up to two contacts of two convex polygons: an edge of one, clipped by the other's."""
-    corners, first, count = parts.corners, parts.first, parts.count
     gap_a, edge_a = _apart(corners, first[pa], count[pa], first[pb], count[pb], margin)
     if gap_a > margin:
         return n
@@ -199,126 +202,137 @@ def _polygons(ints: Any, reals: Any, n: int, parts: Parts, pa: int, pb: int, mar
         if gap <= margin:
             feature = 4 * (facing if which == 0 else (facing + 1) % w) + 2 * flip + which
             n = _add(
-                ints, reals, n, parts, pa, pb, feature, sign * nx, sign * ny,
+                ints, reals, n, body, friction, pa, pb, feature, sign * nx, sign * ny,
                 px - 0.5 * gap * nx, py - 0.5 * gap * ny, gap,
             )  # fmt: skip
     return n
 
 
-@numba.njit(cache=True)
-def _pair(ints: Any, reals: Any, n: int, parts: Parts, pa: int, pb: int, margin: float) -> int:
-    """Add the contacts of two parts; how many contacts there are then."""
-    middles, radius, count, first = parts.middles, parts.radius, parts.count, parts.first
+@numba.njit(cache=True, error_model="numpy", inline="always")
+def _near(middles: Any, radius: Any, pa: int, pb: int, margin: float) -> bool:
+    """Whether the circles of two parts come near: asked of many, so in line."""
     dx, dy = middles[pa, 0] - middles[pb, 0], middles[pa, 1] - middles[pb, 1]
     far = radius[pa] + radius[pb] + margin
-    if dx * dx + dy * dy > far * far:
-        return n
+    return bool(dx * dx + dy * dy <= far * far)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _pair(
+    ints: Any, reals: Any, n: int, body: Any, friction: Any, first: Any, count: Any, radius: Any,
+    middles: Any, corners: Any, pa: int, pb: int, margin: float,
+) -> int:  # fmt: skip
+    """Add the contacts of two parts; how many contacts there are then."""
     if count[pa] and count[pb]:
-        return int(_polygons(ints, reals, n, parts, pa, pb, margin))
+        return int(_polygons(ints, reals, n, body, friction, first, count, corners, pa, pb, margin))
     if not count[pa] and not count[pb]:
         nx, ny, px, py, gap = _discs(pa, pb, middles, radius, margin)
     elif count[pb]:
         nx, ny, px, py, gap = _disc_polygon(
-            middles[pa, 0], middles[pa, 1], radius[pa], parts.corners, first[pb], count[pb], margin
+            middles[pa, 0], middles[pa, 1], radius[pa], corners, first[pb], count[pb], margin
         )
     else:
         nx, ny, px, py, gap = _disc_polygon(
-            middles[pb, 0], middles[pb, 1], radius[pb], parts.corners, first[pa], count[pa], margin
+            middles[pb, 0], middles[pb, 1], radius[pb], corners, first[pa], count[pa], margin
         )
         nx, ny = -nx, -ny
     if gap > margin:
         return n
-    return int(_add(ints, reals, n, parts, pa, pb, 0, nx, ny, px, py, gap))
+    return int(_add(ints, reals, n, body, friction, pa, pb, 0, nx, ny, px, py, gap))
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def place_parts(pose: Any, parts: Parts) -> None:
     """Put circles and vertices of the moving parts where their bodies' centres of mass are."""
+    body, first, count, local = parts.body, parts.first, parts.count, parts.local
+    vertices, middles, corners = parts.vertices, parts.middles, parts.corners
     for p in range(parts.moving):
-        b = parts.body[p]
-        c, s = math.cos(pose[b, 2]), math.sin(pose[b, 2])
+        b = body[p]
         x, y = pose[b, 0], pose[b, 1]
-        parts.middles[p, 0] = x + c * parts.local[p, 0] - s * parts.local[p, 1]
-        parts.middles[p, 1] = y + s * parts.local[p, 0] + c * parts.local[p, 1]
-        for k in range(parts.first[p], parts.first[p] + parts.count[p]):
-            u, v = parts.vertices[k, 0], parts.vertices[k, 1]
-            parts.corners[k, 0], parts.corners[k, 1] = x + c * u - s * v, y + s * u + c * v
+        if count[p] == 0 and local[p, 0] == 0.0 and local[p, 1] == 0.0:
+            middles[p, 0], middles[p, 1] = x, y
+            continue
+        c, s = math.cos(pose[b, 2]), math.sin(pose[b, 2])
+        middles[p, 0] = x + c * local[p, 0] - s * local[p, 1]
+        middles[p, 1] = y + s * local[p, 0] + c * local[p, 1]
+        for k in range(first[p], first[p] + count[p]):
+            u, v = vertices[k, 0], vertices[k, 1]
+            corners[k, 0], corners[k, 1] = x + c * u - s * v, y + s * u + c * v
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _cell(x: float, spacing: float) -> int:
     return int(math.floor(x / spacing))
 
 
-@numba.njit(cache=True)
-def _among_small(
-    ints: Any, reals: Any, parts: Parts, near: Neighbours, there: Any, margin: float
-) -> int:
-    n = 0
-    body, middles, spacing = parts.body, parts.middles, near.spacing
-    mask = near.heads.shape[0] - 1
-    near.heads[:] = -1
-    for p in parts.small:
-        if not there[body[p]]:
-            continue
-        u, v = _cell(middles[p, 0], spacing), _cell(middles[p, 1], spacing)
-        for i in range(u - 1, u + 2):
-            for j in range(v - 1, v + 2):
-                q = near.heads[(i * 73856093 ^ j * 19349663) & mask]
-                while q >= 0:
-                    here = _cell(middles[q, 0], spacing) == i and _cell(middles[q, 1], spacing) == j
-                    if here and body[q] != body[p]:
-                        n = _pair(ints, reals, n, parts, p, q, margin)
-                    q = near.following[q]
-        slot = (u * 73856093 ^ v * 19349663) & mask
-        near.following[p] = near.heads[slot]
-        near.heads[slot] = p
-    return n
-
-
-@numba.njit(cache=True)
-def _with_fixed(
-    ints: Any, reals: Any, n: int, parts: Parts, near: Neighbours, there: Any, margin: float
-) -> int:
-    low, size, box, stamp = near.low, near.size, near.box, near.stamp
-    stamp[:] = -1
-    for p in range(parts.moving):
-        if not there[parts.body[p]]:
-            continue
-        reach = parts.radius[p] + margin
-        x0, x1 = parts.middles[p, 0] - reach, parts.middles[p, 0] + reach
-        y0, y1 = parts.middles[p, 1] - reach, parts.middles[p, 1] + reach
-        i0, i1 = _cell(x0 - low[0], near.cell), _cell(x1 - low[0], near.cell)
-        j0, j1 = _cell(y0 - low[1], near.cell), _cell(y1 - low[1], near.cell)
-        for j in range(max(0, j0), min(size[1] - 1, j1) + 1):
-            for i in range(max(0, i0), min(size[0] - 1, i1) + 1):
-                at = j * size[0] + i
-                for k in range(near.start[at], near.start[at + 1]):
-                    w = near.items[k]
-                    if stamp[w] == p:
-                        continue
-                    stamp[w] = p
-                    if box[w, 0] < x1 and box[w, 2] > x0 and box[w, 1] < y1 and box[w, 3] > y0:
-                        n = _pair(ints, reals, n, parts, p, parts.moving + w, margin)
-    return n
-
-
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def find_contacts(
     ints: Any, reals: Any, parts: Parts, near: Neighbours, there: Any, margin: float
 ) -> int:
     """All contacts of bodies that are ``there (n,)``; their number."""
-    body = parts.body
-    n = _among_small(ints, reals, parts, near, there, margin)
-    for k in range(parts.large.shape[0]):
-        p = parts.large[k]
+    body, friction, first, count = parts.body, parts.friction, parts.first, parts.count
+    radius, middles, corners = parts.radius, parts.middles, parts.corners
+    small, large, moving = parts.small, parts.large, parts.moving
+    n = 0
+    # Small parts among each other, through the hashed grid.
+    heads, following, cells, spacing = near.heads, near.following, near.cells, near.spacing
+    mask = heads.shape[0] - 1
+    heads[:] = -1
+    for m in range(small.shape[0]):
+        p = small[m]
         if not there[body[p]]:
             continue
-        for q in parts.small:
-            if there[body[q]] and body[q] != body[p]:
-                n = _pair(ints, reals, n, parts, q, p, margin)
-        for i in range(k):
-            q = parts.large[i]
-            if there[body[q]] and body[q] != body[p]:
-                n = _pair(ints, reals, n, parts, q, p, margin)
-    return int(_with_fixed(ints, reals, n, parts, near, there, margin))
+        u, v = _cell(middles[p, 0], spacing), _cell(middles[p, 1], spacing)
+        cells[p, 0], cells[p, 1] = u, v
+        for i in range(u - 1, u + 2):
+            for j in range(v - 1, v + 2):
+                q = heads[(i * 73856093 ^ j * 19349663) & mask]
+                while q >= 0:
+                    here = cells[q, 0] == i and cells[q, 1] == j and body[q] != body[p]
+                    if here and _near(middles, radius, p, q, margin):
+                        n = _pair(
+                            ints, reals, n, body, friction, first, count, radius, middles, corners,
+                            p, q, margin,
+                        )  # fmt: skip
+                    q = following[q]
+        slot = (u * 73856093 ^ v * 19349663) & mask
+        following[p] = heads[slot]
+        heads[slot] = p
+    # Large ones with everything that moves.
+    for k in range(large.shape[0]):
+        p = large[k]
+        if not there[body[p]]:
+            continue
+        for m in range(small.shape[0] + k):
+            q = small[m] if m < small.shape[0] else large[m - small.shape[0]]
+            if there[body[q]] and body[q] != body[p] and _near(middles, radius, q, p, margin):
+                n = _pair(
+                    ints, reals, n, body, friction, first, count, radius, middles, corners, q, p,
+                    margin,
+                )  # fmt: skip
+    # Everything with what stands, through its buckets.
+    low, size, box, stamp, cell = near.low, near.size, near.box, near.stamp, near.cell
+    start, items = near.start, near.items
+    stamp[:] = -1
+    for p in range(moving):
+        if not there[body[p]]:
+            continue
+        reach = radius[p] + margin
+        x0, x1 = middles[p, 0] - reach, middles[p, 0] + reach
+        y0, y1 = middles[p, 1] - reach, middles[p, 1] + reach
+        i0, i1 = max(0, _cell(x0 - low[0], cell)), min(size[0] - 1, _cell(x1 - low[0], cell))
+        j0, j1 = max(0, _cell(y0 - low[1], cell)), min(size[1] - 1, _cell(y1 - low[1], cell))
+        for j in range(j0, j1 + 1):
+            for i in range(i0, i1 + 1):
+                at = j * size[0] + i
+                for k in range(start[at], start[at + 1]):
+                    w = items[k]
+                    if stamp[w] == p:
+                        continue
+                    stamp[w] = p
+                    over = box[w, 0] < x1 and box[w, 2] > x0 and box[w, 1] < y1 and box[w, 3] > y0
+                    if over and _near(middles, radius, p, moving + w, margin):
+                        n = _pair(
+                            ints, reals, n, body, friction, first, count, radius, middles, corners,
+                            p, moving + w, margin,
+                        )  # fmt: skip
+    return n
