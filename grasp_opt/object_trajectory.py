@@ -1,0 +1,119 @@
+"""Trajectories of an object: poses and twists in time, and the shapes of chapter 3's tasks."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_model.arrays import Array
+
+_FINE = 2000  # samples of a curve by which its length is measured
+_STEP = 0.02  # [s]
+
+
+@dataclass(frozen=True)
+class ObjectTrajectory:
+    """Samples of where an object's centre of mass is to be, from rest to rest.
+
+    time ``(n,)`` [s] from 0; pose ``(n, 3)`` [m, m, rad], the heading continuous; twist ``(n, 3)``
+    [m/s, m/s, rad/s], both along the world's axes.
+    """
+
+    time: Array
+    pose: Array
+    twist: Array
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return float(self.time[-1])
+
+    @property
+    def length(self) -> float:
+        """[m] of the way of the centre of mass."""
+        return float(np.hypot(*np.diff(self.pose[:, :2], axis=0).T).sum())
+
+    @property
+    def body_twists(self) -> Array:
+        """``(n, 3)`` twists in the object's frame."""
+        c, s = np.cos(self.pose[:, 2]), np.sin(self.pose[:, 2])
+        x, y, omega = self.twist.T
+        return np.column_stack([c * x + s * y, -s * x + c * y, omega])
+
+    def sample(self, t: float) -> Array:
+        """Pose ``(3,)`` at a time [s]; at rest beyond the ends."""
+        return np.array([np.interp(t, self.time, column) for column in self.pose.T])
+
+
+def along(
+    curve: Callable[[Array], Array], end: float, speed: float, acceleration: float
+) -> ObjectTrajectory:
+    """Along ``curve``, which maps a parameter ``(k,)`` from 0 to ``end`` to poses ``(k, 3)``.
+
+    speed, acceleration: [m/s], [m/s^2] of the centre of mass.
+    """
+    u = np.linspace(0.0, end, _FINE)
+    fine = curve(u)
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(fine[:, :2], axis=0).T))])
+    total = float(way[-1])
+    top = min(speed, math.sqrt(total * acceleration))
+    rise = top / acceleration
+    duration = total / top + rise
+    time = np.linspace(0.0, duration, max(20, math.ceil(duration / _STEP) + 1))
+    back = duration - time
+    s = np.where(
+        time < rise,
+        0.5 * acceleration * time**2,
+        np.where(
+            back < rise,
+            total - 0.5 * acceleration * back**2,
+            0.5 * top * rise + top * (time - rise),
+        ),
+    )
+    rate = np.clip(np.minimum(time, back) * acceleration, 0.0, top)
+    at = np.interp(np.clip(s, 0.0, total), way, u)
+    step = 1e-4 * end
+    slope = (curve(at + step) - curve(at - step)) / (2.0 * step)
+    slope /= np.hypot(*slope[:, :2].T)[:, None]  # by the way
+    pose = curve(at)
+    return ObjectTrajectory(time, pose, slope * rate[:, None])
+
+
+def polynomial(
+    coefficients: Sequence[float], length: float, speed: float, acceleration: float
+) -> ObjectTrajectory:
+    """y = sum c_k x^(k + 2) for x from 0 to length [m]; the heading is that of the way."""
+
+    def curve(x: Array) -> Array:
+        y = sum(c * x ** (k + 2) for k, c in enumerate(coefficients))
+        slope = sum((k + 2) * c * x ** (k + 1) for k, c in enumerate(coefficients))
+        return np.column_stack([x, y + 0.0 * x, np.arctan(slope + 0.0 * x)])
+
+    return along(curve, length, speed, acceleration)
+
+
+def sinusoid(
+    amplitude: float, wavelength: float, length: float, speed: float, acceleration: float
+) -> ObjectTrajectory:
+    """y = amplitude sin(2 pi x / wavelength) [m], the heading constant."""
+
+    def curve(x: Array) -> Array:
+        y = amplitude * np.sin(2.0 * math.pi * x / wavelength)
+        return np.column_stack([x, y, np.zeros_like(x)])
+
+    return along(curve, length, speed, acceleration)
+
+
+def study_trajectories(
+    speed: float = 0.1, acceleration: float = 0.1
+) -> dict[str, ObjectTrajectory]:
+    """Six tasks as in 3.1.4, of Fig. 3.4a: three polynomials, three sinusoids. Sizes are ours."""
+    return {
+        "polynomial-1": polynomial((0.25,), 1.0, speed, acceleration),
+        "polynomial-2": polynomial((-0.5,), 0.9, speed, acceleration),
+        "polynomial-3": polynomial((0.8, -0.7), 1.0, speed, acceleration),
+        "sinusoid-1": sinusoid(0.04, 1.0, 1.0, speed, acceleration),
+        "sinusoid-2": sinusoid(0.08, 1.0, 1.0, speed, acceleration),
+        "sinusoid-3": sinusoid(-0.06, 0.7, 1.0, speed, acceleration),
+    }
