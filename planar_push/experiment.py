@@ -16,6 +16,7 @@ def add_words(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--uncertainty", default="mild", help="of the world: none, mild or hard (docs/results.md)"
     )
+    parser.add_argument("--world", default="", help="pybullet or planar, where there is a choice")
     parser.add_argument("--out", default="", help="folder; one that has the beginning is gone on")
     parser.add_argument("--scheduler", default="", help="address of a Dask scheduler")
     parser.add_argument("--workers", type=whole(0), default=0, help="processes here; 0: one a core")
@@ -35,6 +36,7 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.scheduler,
         arguments.workers,
         arguments.uncertainty,
+        arguments.world,
     )
     summary = run_study(arguments.name, options)
     print(f"\n{out}/summary.json")

@@ -22,6 +22,7 @@ _TICK = 0.02  # [s] between velocity commands
 _STRONG = 60.0  # [N] of a pusher's traction: it goes where it is told
 _TOUCH = 1e-4  # [m] between pusher and object at the beginning
 _KEPT = 2e-3  # [m] up to which a contact counts as kept
+_TRANSPORTED = 0.01  # [m] from its trajectory up to which an object counts as transported along it
 _MARGIN = 0.8  # [m] about the trajectory
 
 
@@ -30,8 +31,9 @@ class FormationPush:
     """What became of a push.
 
     displacement: delta of (3.2). energy: E of (3.3) [N]. success: whether every pusher kept its
-    contact all the way. widest: [m] greatest gap. position, orientation: [m], [rad] of the object
-    at the end. objects ``(t, 3)``, agents ``(t, n, 2)``; forces ``(t - 1, n, 2)`` [N] on the
+    contact all the way, and the object its trajectory. widest: [m] greatest gap. astray: [m]
+    greatest distance from where the object was to be. position, orientation: [m], [rad] of it at
+    the end. objects ``(t, 3)``, agents ``(t, n, 2)``; forces ``(t - 1, n, 2)`` [N] on the
     object.
     """
 
@@ -39,6 +41,7 @@ class FormationPush:
     energy: float
     success: bool
     widest: float
+    astray: float
     position: float
     orientation: float
     objects: Array
@@ -81,15 +84,17 @@ def push(
     at_start = se2.transform(start, local)
     robots = {n: (disc, np.array([*p, 0.0])) for n, p in zip(names, at_start, strict=True)}
     kind = world_kind(world)
-    objects, agents, forces, widest = [start], [at_start], [], 0.0
+    objects, agents, forces, widest, astray = [start], [at_start], [], 0.0, 0.0
     bodies = {"object": (item, item.geometric_pose(start))}
     running = kind.make(room, robots, bodies, kind.settings(), _TICK)
     try:
         steps = round(_TICK / running.time_step)
         for tick in range(1, int(np.ceil(trajectory.duration / _TICK)) + 1):
-            goal = se2.transform(trajectory.sample(tick * _TICK), places)
-            twists = np.zeros((len(names), 3))
-            twists[:, :2] = (goal - agents[-1]) / _TICK
+            before, after = (trajectory.sample((tick - back) * _TICK) for back in (1, 0))
+            twists = np.empty((len(names), 3))
+            twists[:, :2] = (se2.transform(after, places) - agents[-1]) / _TICK
+            # A disc that did not turn with the formation would roll along the object's side.
+            twists[:, 2] = (after[2] - before[2]) / _TICK
             running.command_all(names, twists, True)
             running.step(steps)
             poses = running.poses()
@@ -98,6 +103,7 @@ def push(
             objects.append(here)
             agents.append(now)
             forces.append(_felt(running, names))
+            astray = max(astray, float(np.hypot(*(here - after)[:2])))
             if tick * _TICK > 0.5:
                 widest = max(widest, float(_gaps(item, here, now, radius).max()))
             if seen is not None:
@@ -110,8 +116,9 @@ def push(
     return FormationPush(
         _slid(way, np.array(agents), trajectory.length),
         energy(way, contacts.points, felt) if moved else float("nan"),
-        widest <= _KEPT,
+        widest <= _KEPT and astray <= _TRANSPORTED,
         widest,
+        astray,
         float(np.hypot(*off[:2])),
         abs(float(off[2])),
         way,

@@ -19,6 +19,7 @@ from push_study.cluster import check_cluster
 from push_study.summary import aggregate
 from push_study.trials import Row, run_trials
 from push_study.uncertainty import uncertainty
+from sim_bridge.worlds import world_kind
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,8 @@ class StudyOptions:
     """scenarios: names or paths. trials: of each. seed: of the first trial; the next has the next.
 
     scheduler: address of a Dask scheduler; empty for local processes. workers: 0 for one a core.
-    uncertainty: name of how far the world is from what is believed.
+    uncertainty: name of how far the world is from what is believed. world: kind of world, for
+    experiments that choose it themselves; the others' is that of their scenarios.
     """
 
     scenarios: tuple[str, ...]
@@ -36,6 +38,7 @@ class StudyOptions:
     scheduler: str = ""
     workers: int = 0
     uncertainty: str = "mild"
+    world: str = ""
 
 
 class Experiment(Protocol):
@@ -84,7 +87,12 @@ def run_study(name: str, options: StudyOptions) -> dict[str, Any]:
     what = experiment(name)
     _check(options)
     tasks = what.tasks(options)
+    if options.world and not getattr(what, "CHOOSES_WORLD", False):
+        raise SettingsError(
+            f"world: that of '{name}' is its scenarios', bridge.world; no other can be asked for"
+        )
     mark = {"experiment": name, "seed": options.seed, "uncertainty": options.uncertainty}
+    mark |= {"world": options.world} if options.world else {}
     _claim(options.out, mark | {"revision": revision()})
     with _alone(options.out):
         rows = run_trials(
@@ -125,6 +133,8 @@ def _check(options: StudyOptions) -> None:
     if len(set(stems)) < len(stems):
         raise SettingsError(f"scenarios: each once, and names that differ; got {', '.join(stems)}")
     uncertainty(options.uncertainty)
+    if options.world:
+        world_kind(options.world)
     if options.scheduler:
         check_cluster()
 

@@ -136,9 +136,7 @@ def test_robots_that_have_room_behind_keep_the_distance_all_the_way(robot, box):
         enough = robot.footprint_radius + 0.5 * settings.safety_distance
         assert (turning[found] >= enough - 1e-9).all()
         loss = (np.sqrt(2.0) + 0.1) * CELL
-        plenty = (exact.min(axis=1) > settings.safety_distance + loss) & (
-            turning > enough + loss
-        )
+        plenty = (exact.min(axis=1) > settings.safety_distance + loss) & (turning > enough + loss)
         assert found[plenty].all()
         has += found.sum()
         hasnt += (~found).sum()
