@@ -10,6 +10,7 @@ NAMES = (
     "grasp",
     "mpc",
     "nmpc",
+    "placement",
     "plan",
     "latency",
     "lockstep",

@@ -56,6 +56,12 @@ class ContactOutline:
         self._last = heading + np.where(following, np.roll(half, -1), 0.0)
 
     @property
+    def arrays(self) -> tuple[Array, Array, Array, Array, Array]:
+        """Starts and edges ``(m, 2)`` [m], ways to them ``(m + 1,)`` [m], headings of the normal
+        [rad] at their beginnings and ends ``(m,)``: for compiled code."""
+        return self._starts, self._edges, self._way, self._first, self._last
+
+    @property
     def length(self) -> float:
         """[m] of the whole outline."""
         return float(self._way[-1])

@@ -31,7 +31,7 @@ from push_planner.settings import PlannerSettings
 _OUTLINE_SPACING = 0.01  # [m] of points between which distances are interpolated
 _LEAVING = 0.15  # [m] of the first push, in which it may be nearer to obstacles than later
 _LEAST = 0.003  # [m] that the robot keeps even then
-_TURNING = 0.5  # of the safety distance that it keeps where it turns, before a push
+_TURNING = 0.25  # of the safety distance that it keeps where it turns, before a push
 
 
 @numba.njit(cache=True, fastmath=True)

@@ -132,8 +132,8 @@ def test_robots_that_have_room_behind_keep_the_distance_all_the_way(robot, box):
         exact = body_distance(world, placed(ways, robot.outline)).reshape(-1, 24)
         turning = points_distance(world, ways.reshape(-1, 24, 3)[:, -1, :2])
         assert (exact[found].min(axis=1, initial=1.0) >= settings.safety_distance - 1e-9).all()
-        # Where it turns, half of that distance besides its own size.
-        enough = robot.footprint_radius + 0.5 * settings.safety_distance
+        # Where it turns, a quarter of that distance besides its own size.
+        enough = robot.footprint_radius + 0.25 * settings.safety_distance
         assert (turning[found] >= enough - 1e-9).all()
         loss = (np.sqrt(2.0) + 0.1) * CELL
         plenty = (exact.min(axis=1) > settings.safety_distance + loss) & (turning > enough + loss)

@@ -1,0 +1,273 @@
+"""Task-oriented placement of robots round an object (3.2.1): where, and with which forces.
+
+The thesis solves (3.16)-(3.19) by a local method. Here the places are searched for globally: with
+them given, the forces are a convex problem that is solved in a fraction of a millisecond
+(tracking_cost.py), so that every placement on a grid about the outline is looked at, and the best
+ones are refined. ``benchmarks/placement.py`` holds the answer against far finer grids.
+"""
+
+import itertools
+import math
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_opt.contact_outline import ContactOutline, Contacts
+from grasp_opt.object_trajectory import ObjectTrajectory
+from grasp_opt.tracking_cost import cone_columns, contact_at, tracking_cost
+from grasp_opt.wrench_cone import margin, task_wrenches, wrench_rays
+from push_model.arrays import Array
+from push_model.settings import bounded, settings
+from push_model.specs import ObjectSpec
+
+_GRID = {1: 96, 2: 60, 3: 24, 4: 16, 5: 13}  # places about the outline, by the number of robots
+_CENTRES = {1: 1, 2: 96, 3: 60, 4: 60, 5: 60}  # of rows of robots side by side
+_ROWS = (1.0, 1.2, 1.5, 2.0, 2.7)  # times the least distance between them
+_PAIRS = 24  # places of two side by side, with the others elsewhere
+_REFINED = 12  # of the placements on the grid
+_LOOSE, _TIGHT = 1e-4, 1e-7  # relative gaps of costs, on the grid and after it
+_COARSE, _FINEST = 4e-3, 2e-4  # [m] of the refinement, of all and of the best of them
+_WORTH, _FINALLY = 1e-3, 1e-6  # of the cost that a step must save, likewise
+_LAST = 3  # refined to the end
+
+
+class NoPlacement(Exception):
+    """Raised when robots do not find room beside each other."""
+
+
+@settings
+class PlacementSettings:
+    """Weights of (3.16) and room between robots."""
+
+    model: Literal["limit_surface", "printed"] = bounded(
+        "limit_surface", doc="how the object moves: under its limit surface, or (3.17) as printed"
+    )
+    steps: int = bounded(50, low=5, high=1000, doc="N of (3.16)")
+    position_weight: float = bounded(1e4, low=1e-6, high=1e9, doc="[1/m^2] Q")
+    orientation_weight: float = bounded(200.0, low=0.0, high=1e9, doc="[1/rad^2] Q")
+    force_weight: float = bounded(0.05, low=1e-9, high=1e9, doc="R, of forces over the floor's")
+    gap: float = bounded(5e-3, low=0.0, high=1.0, doc="[m] between robots")
+    corner: float = bounded(0.015, low=0.0, high=1.0, doc="[m] between contacts and corners")
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where robots push and what it costs.
+
+    way ``(n,)`` [m] along the outline, in the order of the outline; contacts; cost of (3.16);
+    forces ``(N, n, 2)`` [N] in the object's frame; errors ``(N, 3)`` of the pose that remain;
+    margin: of the grasp-task compatibility test; evaluated: placements that were looked at.
+    """
+
+    way: Array
+    contacts: Contacts
+    cost: float
+    forces: Array
+    errors: Array
+    margin: float
+    evaluated: int
+
+
+class Placer:
+    """Searches the places of ``count`` round robots of a radius [m] for one task.
+
+    Polar angles theta are the thesis's coordinates; ways along the outline are used here, and
+    ``ContactOutline`` converts. steps ``(N, 3)`` [m, m, rad] of the task; turn ``(N, 2)``: cosine
+    and sine of its headings; weights ``(3,)``, force_weight: Q and R; scale ``(3,)``: motion of a
+    step that the components of a wrench make; size: of lambdas, roughly; cone: sine and cosine of
+    the friction's angle; evaluated: placements looked at so far.
+    """
+
+    def __init__(
+        self,
+        item: ObjectSpec,
+        trajectory: ObjectTrajectory,
+        count: int,
+        radius: float,
+        settings: PlacementSettings | None = None,
+    ) -> None:
+        """Raises ValueError for a number of robots that is not 1 to 5."""
+        if count not in _GRID:
+            raise ValueError(f"1 to 5 robots can be placed, not {count}")
+        self.settings = settings or PlacementSettings()
+        self.item, self.count, self.radius = item, count, radius
+        self.outline = ContactOutline(item.geometry)
+        s, surface = self.settings, item.limit_surface()
+        self._surface, self._twists = surface, trajectory.body_twists
+        at = np.linspace(0.0, trajectory.duration, s.steps + 1)
+        poses = np.array([trajectory.sample(t) for t in at])
+        self.steps = np.diff(poses, axis=0)
+        heading = 0.5 * (poses[1:, 2] + poses[:-1, 2])
+        self.turn = np.column_stack([np.cos(heading), np.sin(heading)])
+        self.weights = np.array([s.position_weight, s.position_weight, s.orientation_weight])
+        if s.model == "printed":
+            # Forces move the object by as much as they are, whatever the time: no unit is right.
+            self.force_scale, self.scale = 1.0, np.ones(3)
+            self.size = float(np.abs(self.steps).max())
+            self.force_weight = s.force_weight
+        else:
+            # At the task's mean speed the floor takes its greatest force: that is lambda = 1.
+            self.force_scale = surface.max_force
+            speeds = np.linalg.norm(self._twists * [1.0, 1.0, surface.radius], axis=1)
+            moving = float(speeds.mean()) * trajectory.duration / s.steps
+            self.scale = moving * np.array([1.0, 1.0, 1.0 / surface.radius**2])
+            self.size, self.force_weight = 1.0 / count, s.force_weight
+        angle = math.atan(item.contact_friction)
+        self.cone = math.sin(angle), math.cos(angle)
+        m = 2 * count
+        self._room = tuple(np.empty((s.steps, m)) for _ in range(3))
+        self._work = np.empty((4, s.steps, 9))
+        self._columns, self._contacts = np.empty((3, m)), np.empty((count, 4))
+        self.evaluated = 0
+
+    def cost(self, way: Array, tolerance: float = _TIGHT) -> float:
+        """(3.16) of a placement ``(n,)`` [m] along the outline, over all forces."""
+        self.evaluated += 1
+        u, z, new = self._room
+        return float(
+            _cost_at(
+                way, *self.outline.arrays, *self.cone, self.scale, self.turn, self.steps,
+                self.weights, self.force_weight, self.size, tolerance, self._contacts,
+                self._columns, u, z, new, self._work,
+            )
+        )  # fmt: skip
+
+    def allowed(self, way: Array) -> bool:
+        """Whether robots at these places keep apart and off the corners."""
+        s, contacts = self.settings, self.outline.at(way)
+        if self.outline.from_corner(way).min() < s.corner:
+            return False
+        centres = contacts.centres(self.radius)
+        away = np.hypot(*(centres[:, None] - centres[None]).transpose(2, 0, 1))
+        near = away[np.triu_indices(len(way), 1)]
+        return bool(near.size == 0 or near.min() >= 2.0 * self.radius + s.gap)
+
+    def grid(self, points: int, count: int = 0) -> NDArray[np.float64]:
+        """``(k, n)`` [m] all allowed placements on so many points evenly about the outline.
+
+        count: of robots; all when it is 0.
+        """
+        count = count or self.count
+        at = (np.arange(points) + 0.5) / points * self.outline.length
+        at = at[self.outline.from_corner(at) >= self.settings.corner]
+        centres = self.outline.at(at).centres(self.radius)
+        away = np.hypot(*(centres[:, None] - centres[None]).transpose(2, 0, 1))
+        free = away >= 2.0 * self.radius + self.settings.gap
+        chosen = [
+            pick
+            for pick in itertools.combinations(range(len(at)), count)
+            if all(free[i, j] for i, j in itertools.combinations(pick, 2))
+        ]
+        return at[np.array(chosen, dtype=np.int64).reshape(-1, count)]
+
+    def candidates(self) -> Array:
+        """``(k, n)`` [m] placements from which the best is refined.
+
+        Those of a coarse grid; rows of robots side by side, for which a side may have just enough
+        room; and for three robots or more, two side by side with the others on the grid.
+        """
+        n, total = self.count, self.outline.length
+        found = [self.grid(_GRID[n])]
+        pitch = (2.0 * self.radius + self.settings.gap) * (1.0 + 1e-9)
+        centres = np.arange(_CENTRES[n]) / _CENTRES[n] * total
+        row = np.arange(n) - 0.5 * (n - 1)
+        rows = [c + f * pitch * row for f in _ROWS for c in centres]
+        if n >= 3:
+            others = self.grid(_GRID[n], n - 2)
+            pairs = np.arange(_PAIRS)[:, None] / _PAIRS * total + pitch * np.array([[-0.5, 0.5]])
+            rows += [np.concatenate([pair, other]) for pair in pairs for other in others]
+        allowed = [way for way in rows if self.allowed(way)]
+        if allowed:
+            found.append(np.array(allowed))
+        return np.mod(np.vstack(found), total)
+
+    def best(self, points: int = 0, refined: int = _REFINED) -> Placement:
+        """The best of all candidates, refined; or of a grid of so many points.
+
+        Raises
+        ------
+        NoPlacement: so many robots do not fit beside each other anywhere.
+        """
+        candidates = self.grid(points) if points else self.candidates()
+        if not len(candidates):
+            raise NoPlacement(
+                f"{self.count} robots of {1e3 * self.radius:.0f} mm find no room round the object"
+            )
+        costs = np.array([self.cost(way, _LOOSE) for way in candidates])
+        step = 0.5 * self.outline.length / (points or _GRID[self.count])
+        order = np.argsort(costs, kind="stable")[:refined]
+        found = [self.refine(candidates[k], step, _COARSE, _WORTH) for k in order]
+        found.sort(key=lambda pair: pair[0])
+        last = [self.refine(way, _COARSE, _FINEST, _FINALLY) for _, way in found[:_LAST]]
+        return self.placement(min(last, key=lambda pair: pair[0])[1])
+
+    def refine(
+        self, way: Array, step: float, finest: float = _FINEST, worth: float = _FINALLY
+    ) -> tuple[float, Array]:
+        """Cost and places that robots do not better by moving a little: a compass search.
+
+        One at a time, all together, and all apart or together; by steps [m] until ``finest``, as
+        long as they save the part ``worth`` of the cost.
+        """
+        way = np.array(way, dtype=np.float64)
+        order = np.argsort(np.argsort(way)) - 0.5 * (self.count - 1)
+        moves = [*np.eye(self.count), np.ones(self.count), order]
+        moves = [sign * move for move in moves for sign in (1.0, -1.0)]
+        cost = self.cost(way)
+        while step > finest:
+            better = False
+            for move in moves:
+                trial = way + step * move
+                if not self.allowed(trial):
+                    continue
+                other = self.cost(trial)
+                if other < cost * (1.0 - worth):
+                    cost, way, better = other, trial, True
+            if not better:
+                step *= 0.5
+        return cost, np.mod(way, self.outline.length)
+
+    def placement(self, way: Array) -> Placement:
+        """All about a placement ``(n,)`` [m]."""
+        way = np.sort(np.mod(np.asarray(way, dtype=np.float64), self.outline.length))
+        cost = self.cost(way)
+        u = self._room[0].copy()
+        contacts = self.outline.at(way)
+        sine, cosine = self.cone
+        normals = contacts.normals
+        across = np.column_stack([-normals[:, 1], normals[:, 0]])
+        right, left = cosine * normals - sine * across, cosine * normals + sine * across
+        forces = u[:, 0::2, None] * right + u[:, 1::2, None] * left
+        moved = np.einsum("ij,kj->ki", self._columns, u)
+        c, s = self.turn.T
+        world = np.column_stack(
+            [c * moved[:, 0] - s * moved[:, 1], s * moved[:, 0] + c * moved[:, 1], moved[:, 2]]
+        )
+        surface, mu = self._surface, self.item.contact_friction
+        rays = wrench_rays(contacts.points, normals, mu, surface.radius)
+        held = margin(rays, task_wrenches(self._twists, surface, surface.radius))
+        return Placement(
+            way,
+            contacts,
+            cost,
+            self.force_scale * forces,
+            np.cumsum(world - self.steps, axis=0),
+            held,
+            self.evaluated,
+        )
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _cost_at(
+    way: Any, starts: Any, edges: Any, ways: Any, first: Any, last: Any, sine: float,
+    cosine: float, scale: Any, turn: Any, steps: Any, q: Any, r: float, size: float,
+    tolerance: float, contacts: Any, columns: Any, u: Any, z: Any, new: Any, work: Any,
+) -> float:  # fmt: skip
+    for i in range(way.shape[0]):
+        x, y, nx, ny = contact_at(way[i], starts, edges, ways, first, last)
+        contacts[i, 0], contacts[i, 1], contacts[i, 2], contacts[i, 3] = x, y, nx, ny
+    cone_columns(contacts, sine, cosine, scale, columns)
+    return float(tracking_cost(columns, turn, steps, q, r, size, tolerance, u, z, new, work))
