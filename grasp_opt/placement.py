@@ -32,6 +32,7 @@ _LOOSE, _TIGHT = 1e-4, 1e-7  # relative gaps of costs, on the grid and after it
 _COARSE, _FINEST = 4e-3, 2e-4  # [m] of the refinement, of all and of the best of them
 _WORTH, _FINALLY = 1e-3, 1e-6  # of the cost that a step must save, likewise
 _LAST = 3  # refined to the end
+_SLOWEST = 0.05  # of the greatest pace: at rest no force would move anything
 
 
 class NoPlacement(Exception):
@@ -75,10 +76,10 @@ class Placer:
     """Searches the places of ``count`` round robots of a radius [m] for one task.
 
     Polar angles theta are the thesis's coordinates; ways along the outline are used here, and
-    ``ContactOutline`` converts. steps ``(N, 3)`` [m, m, rad] of the task; turn ``(N, 2)``: cosine
-    and sine of its headings; weights ``(3,)``, force_weight: Q and R; scale ``(3,)``: motion of a
-    step that the components of a wrench make; size: of lambdas, roughly; cone: sine and cosine of
-    the friction's angle; evaluated: placements looked at so far.
+    ``ContactOutline`` converts. steps ``(N, 3)`` [m, m, rad] of the task; turn ``(N, 3)``: cosine
+    and sine of its headings times the pace [m], and the pace; weights ``(3,)``, force_weight: Q and
+    R; scale ``(3,)``: motion at unit pace that the components of a wrench make; size: of lambdas,
+    roughly; cone: sine and cosine of the friction's angle; evaluated: placements looked at so far.
     """
 
     def __init__(
@@ -101,20 +102,20 @@ class Placer:
         poses = np.array([trajectory.sample(t) for t in at])
         self.steps = np.diff(poses, axis=0)
         heading = 0.5 * (poses[1:, 2] + poses[:-1, 2])
-        self.turn = np.column_stack([np.cos(heading), np.sin(heading)])
         self.weights = np.array([s.position_weight, s.position_weight, s.orientation_weight])
+        self.force_weight = s.force_weight
+        c = surface.radius
         if s.model == "printed":
             # Forces move the object by as much as they are, whatever the time: no unit is right.
-            self.force_scale, self.scale = 1.0, np.ones(3)
-            self.size = float(np.abs(self.steps).max())
-            self.force_weight = s.force_weight
+            pace, self.scale = np.ones(s.steps), np.ones(3)
+            self.force_scale, self.size = 1.0, float(np.abs(self.steps).max())
         else:
-            # At the task's mean speed the floor takes its greatest force: that is lambda = 1.
-            self.force_scale = surface.max_force
-            speeds = np.linalg.norm(self._twists * [1.0, 1.0, surface.radius], axis=1)
-            moving = float(speeds.mean()) * trajectory.duration / s.steps
-            self.scale = moving * np.array([1.0, 1.0, 1.0 / surface.radius**2])
-            self.size, self.force_weight = 1.0 / count, s.force_weight
+            # However fast, the floor takes its greatest force: lambda = 1 at the task's pace.
+            pace = np.linalg.norm(self.steps * [1.0, 1.0, c], axis=1)
+            pace = np.maximum(pace, _SLOWEST * pace.max())
+            self.scale = np.array([1.0, 1.0, 1.0 / c**2])
+            self.force_scale, self.size = surface.max_force, 1.0 / count
+        self.turn = np.column_stack([pace * np.cos(heading), pace * np.sin(heading), pace])
         angle = math.atan(item.contact_friction)
         self.cone = math.sin(angle), math.cos(angle)
         m = 2 * count
@@ -242,9 +243,9 @@ class Placer:
         right, left = cosine * normals - sine * across, cosine * normals + sine * across
         forces = u[:, 0::2, None] * right + u[:, 1::2, None] * left
         moved = np.einsum("ij,kj->ki", self._columns, u)
-        c, s = self.turn.T
+        c, s, p = self.turn.T
         world = np.column_stack(
-            [c * moved[:, 0] - s * moved[:, 1], s * moved[:, 0] + c * moved[:, 1], moved[:, 2]]
+            [c * moved[:, 0] - s * moved[:, 1], s * moved[:, 0] + c * moved[:, 1], p * moved[:, 2]]
         )
         surface, mu = self._surface, self.item.contact_friction
         rays = wrench_rays(contacts.points, normals, mu, surface.radius)

@@ -53,8 +53,8 @@ class LocalPlacer:
         rows: list[Any] = []
         before: Any = ca.DM.zeros(3)
         for k in range(steps):
-            c, d = placer.turn[k]
-            turn = ca.DM([[c, -d, 0.0], [d, c, 0.0], [0.0, 0.0, 1.0]])
+            c, d, pace = placer.turn[k]
+            turn = ca.DM([[c, -d, 0.0], [d, c, 0.0], [0.0, 0.0, pace]])
             rows.append(x[:, k] - before - turn @ (C @ u[:, k]) + ca.DM(placer.steps[k]))
             before = x[:, k]
             cost += 0.5 * ca.dot(q * x[:, k], x[:, k]) + 0.5 * r * ca.dot(u[:, k], u[:, k])

@@ -70,7 +70,7 @@ def _regulate(
         for j in range(m):
             B[0, j] = c * columns[0, j] - s * columns[1, j]
             B[1, j] = s * columns[0, j] + c * columns[1, j]
-            B[2, j] = columns[2, j]
+            B[2, j] = turn[k, 2] * columns[2, j]
             d = 1.0 / (r + z[k, j] / u[k, j])
             g = d * (aim / u[k, j] + z[k, j])
             b0, b1, b2 = B[0, j], B[1, j], B[2, j]
@@ -122,7 +122,7 @@ def _regulate(
             b0 = c * columns[0, j] - s * columns[1, j]
             b1 = s * columns[0, j] + c * columns[1, j]
             d = 1.0 / (r + z[k, j] / u[k, j])
-            pull = aim / u[k, j] + z[k, j] - (b0 * l0 + b1 * l1 + columns[2, j] * l2)
+            pull = aim / u[k, j] + z[k, j] - (b0 * l0 + b1 * l1 + turn[k, 2] * columns[2, j] * l2)
             new[k, j] = d * pull
 
 
@@ -135,8 +135,9 @@ def tracking_cost(
 
     Parameters
     ----------
-    columns: ``(3, m)`` motion of the object in a step, in its frame, of a unit of each lambda.
-    turn: ``(N, 2)`` cosine and sine of the object's heading. steps: ``(N, 3)`` the task's steps.
+    columns: ``(3, m)`` motion of the object, in its frame, of a unit of each lambda; a step makes
+    so much of it as its pace says. turn: ``(N, 3)`` cosine and sine of the object's heading times
+    the pace, and the pace. steps: ``(N, 3)`` the task's steps.
     q: ``(3,)`` weights of the pose's error. r: weight of lambdas. size: of lambdas, roughly.
     tolerance: relative gap to the optimum. z, new ``(N, m)``, work ``(4, N, 9)``: room to work.
     """
@@ -191,7 +192,7 @@ def _cost(columns: Any, turn: Any, steps: Any, q: Any, r: float, u: Any) -> floa
         c, s = turn[k, 0], turn[k, 1]
         e0 += c * x - s * y - steps[k, 0]
         e1 += s * x + c * y - steps[k, 1]
-        e2 += w - steps[k, 2]
+        e2 += turn[k, 2] * w - steps[k, 2]
         cost += 0.5 * (q[0] * e0 * e0 + q[1] * e1 * e1 + q[2] * e2 * e2)
     return float(cost)
 
