@@ -8,7 +8,7 @@ ones are refined. ``benchmarks/placement.py`` holds the answer against far finer
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numba
@@ -32,6 +32,8 @@ _LOOSE, _TIGHT = 1e-4, 1e-7  # relative gaps of costs, on the grid and after it
 _COARSE, _FINEST = 4e-3, 2e-4  # [m] of the refinement, of all and of the best of them
 _WORTH, _FINALLY = 1e-3, 1e-6  # of the cost that a step must save, likewise
 _LAST = 3  # refined to the end
+_MARGINS = (0.2, 0.15, 0.1, 0.05, 0.0)  # that are asked for, one after another
+_HELD_AGAINST = 4000  # of the cheapest candidates, to find some that hold the task
 _SLOWEST = 0.05  # of the greatest pace: at rest no force would move anything
 
 
@@ -52,6 +54,15 @@ class PlacementSettings:
     force_weight: float = bounded(0.05, low=1e-9, high=1e9, doc="R, of forces over the floor's")
     gap: float = bounded(5e-3, low=0.0, high=1.0, doc="[m] between robots")
     corner: float = bounded(0.015, low=0.0, high=1.0, doc="[m] between contacts and corners")
+    least_margin: float = bounded(
+        -1.0, low=-1.0, high=1.0, doc="of the compatibility test, that a placement must have"
+    )
+    only_pushing: bool = bounded(
+        False, doc="whether every contact must move towards the object all along the task"
+    )
+    most_force: float = bounded(
+        1e6, low=1e-3, high=1e6, doc="[N] that a robot may have to exert, its traction"
+    )
 
 
 @dataclass(frozen=True)
@@ -97,7 +108,10 @@ class Placer:
         self.item, self.count, self.radius = item, count, radius
         self.outline = ContactOutline(item.geometry)
         s, surface = self.settings, item.limit_surface()
-        self._surface, self._twists = surface, trajectory.body_twists
+        self._surface = surface
+        twists = trajectory.body_twists
+        self._wrenches = task_wrenches(twists, surface, surface.radius)
+        self._moving = twists[np.linalg.norm(twists, axis=1) > 0.0]
         at = np.linspace(0.0, trajectory.duration, s.steps + 1)
         poses = np.array([trajectory.sample(t) for t in at])
         self.steps = np.diff(poses, axis=0)
@@ -146,6 +160,34 @@ class Placer:
         near = away[np.triu_indices(len(way), 1)]
         return bool(near.size == 0 or near.min() >= 2.0 * self.radius + s.gap)
 
+    def holds(self, way: Array) -> bool:
+        """Whether a placement has the margin, and asks no robot for more force than it has."""
+        s = self.settings
+        if s.only_pushing and not self.pushes(way):
+            return False
+        if s.least_margin > -1.0 and self.margin(self.outline.at(way)) < s.least_margin:
+            return False
+        if s.most_force >= 1e6:
+            return True
+        self.cost(way, _LOOSE)
+        u, (sine, cosine) = self._room[0], self.cone
+        a, b = u[:, 0::2], u[:, 1::2]
+        square = a**2 + b**2 + 2.0 * a * b * (cosine**2 - sine**2)
+        return bool(self.force_scale**2 * square.max() <= s.most_force**2)
+
+    def pushes(self, way: Array) -> bool:
+        """Whether every contact moves towards the object all along: who goes ahead of it does not
+        push, but holds it back."""
+        contacts = self.outline.at(way)
+        (x, y), (nx, ny), (vx, vy, omega) = contacts.points.T, contacts.normals.T, self._moving.T
+        towards = np.outer(vx, nx) + np.outer(vy, ny) + np.outer(omega, x * ny - y * nx)
+        return bool((towards > 0.0).all())
+
+    def margin(self, contacts: Contacts) -> float:
+        """Of the grasp-task compatibility test."""
+        mu, c = self.item.contact_friction, self._surface.radius
+        return margin(wrench_rays(contacts.points, contacts.normals, mu, c), self._wrenches)
+
     def grid(self, points: int, count: int = 0) -> NDArray[np.float64]:
         """``(k, n)`` [m] all allowed placements on so many points evenly about the outline.
 
@@ -190,7 +232,7 @@ class Placer:
 
         Raises
         ------
-        NoPlacement: so many robots do not fit beside each other anywhere.
+        NoPlacement: so many robots do not fit beside each other anywhere, or hold the task nowhere.
         """
         candidates = self.grid(points) if points else self.candidates()
         if not len(candidates):
@@ -199,8 +241,15 @@ class Placer:
             )
         costs = np.array([self.cost(way, _LOOSE) for way in candidates])
         step = 0.5 * self.outline.length / (points or _GRID[self.count])
-        order = np.argsort(costs, kind="stable")[:refined]
-        found = [self.refine(candidates[k], step, _COARSE, _WORTH) for k in order]
+        order = [
+            k for k in np.argsort(costs, kind="stable")[:_HELD_AGAINST] if self.holds(candidates[k])
+        ]
+        if not order:
+            raise NoPlacement(
+                f"no placement of {self.count} robots holds the task with a margin of "
+                f"{self.settings.least_margin:g} and {self.settings.most_force:g} N a robot"
+            )
+        found = [self.refine(candidates[k], step, _COARSE, _WORTH) for k in order[:refined]]
         found.sort(key=lambda pair: pair[0])
         last = [self.refine(way, _COARSE, _FINEST, _FINALLY) for _, way in found[:_LAST]]
         return self.placement(min(last, key=lambda pair: pair[0])[1])
@@ -225,7 +274,7 @@ class Placer:
                 if not self.allowed(trial):
                     continue
                 other = self.cost(trial)
-                if other < cost * (1.0 - worth):
+                if other < cost * (1.0 - worth) and self.holds(trial):
                     cost, way, better = other, trial, True
             if not better:
                 step *= 0.5
@@ -247,18 +296,41 @@ class Placer:
         world = np.column_stack(
             [c * moved[:, 0] - s * moved[:, 1], s * moved[:, 0] + c * moved[:, 1], p * moved[:, 2]]
         )
-        surface, mu = self._surface, self.item.contact_friction
-        rays = wrench_rays(contacts.points, normals, mu, surface.radius)
-        held = margin(rays, task_wrenches(self._twists, surface, surface.radius))
         return Placement(
             way,
             contacts,
             cost,
             self.force_scale * forces,
             np.cumsum(world - self.steps, axis=0),
-            held,
+            self.margin(contacts),
             self.evaluated,
         )
+
+
+def robust_placement(
+    item: ObjectSpec,
+    trajectory: ObjectTrajectory,
+    count: int,
+    radius: float,
+    most_force: float,
+    settings: PlacementSettings | None = None,
+) -> Placement:
+    """The best placement for robots that correct errors as they push: with as much margin as there
+    is, all of them pushing, and none with more than ``most_force`` [N].
+
+    Raises
+    ------
+    NoPlacement: none holds the task at all.
+    """
+    settings = settings or PlacementSettings()
+    for least in _MARGINS:
+        asked = replace(settings, least_margin=least, only_pushing=True, most_force=most_force)
+        try:
+            return Placer(item, trajectory, count, radius, asked).best()
+        except NoPlacement:
+            if least == _MARGINS[-1]:
+                raise
+    raise AssertionError("unreachable")
 
 
 @numba.njit(cache=True, error_model="numpy")

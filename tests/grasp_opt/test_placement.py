@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from grasp_opt.object_trajectory import polynomial, study_trajectories
-from grasp_opt.placement import NoPlacement, PlacementSettings, Placer
+from grasp_opt.placement import NoPlacement, PlacementSettings, Placer, robust_placement
 from grasp_opt.placement_nlp import LocalPlacer
 from push_model.shape_specs import RectangleShape
 from push_scenario.bodies import load_object
@@ -125,3 +125,21 @@ def test_the_thesis_programme_by_ipopt_ends_where_the_search_does_on_an_ellipse(
         )
         assert best.cost <= answer.objective * 1.005
         assert np.sort(answer.way) == pytest.approx(best.way, abs=5e-3)
+
+
+def test_a_robust_placement_has_margin_pushes_only_and_asks_no_robot_for_too_much():
+    """Where the cheapest one has hardly any margin, or a robot ahead of the object."""
+    item, task = load_object("plate_ellipse"), SIX["polynomial-3"]
+    cheapest = Placer(item, task, 3, 0.05, FEW).best()
+    robust = robust_placement(item, task, 3, 0.05, 1.4, FEW)
+    assert cheapest.margin < 0.05 and robust.margin >= 0.2 and robust.cost >= cheapest.cost
+    assert np.linalg.norm(robust.forces, axis=2).max() <= 1.4 * 1.001
+    contacts = robust.contacts
+    for vx, vy, omega in task.body_twists[1:-1]:
+        x, y = contacts.points.T
+        speeds = np.column_stack([vx - omega * y, vy + omega * x])
+        assert ((speeds * contacts.normals).sum(axis=1) > 0.0).all()
+    free = Placer(item, task, 3, 0.05, replace(FEW, least_margin=0.2)).best()
+    assert free.cost <= robust.cost * (1 + 1e-6)
+    with pytest.raises(NoPlacement, match=r"holds the task with a margin of 0 and 0\.5 N a robot"):
+        robust_placement(item, task, 2, 0.05, 0.5, FEW)
