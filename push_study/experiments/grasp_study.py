@@ -204,6 +204,8 @@ def _plots(rows: Sequence[Row], options: StudyOptions) -> None:
             mine = [r for r in done if r["scenario"] == shape and np.isfinite(r[column])]
             axis.plot([r[column] for r in mine], [r["energy_n"] for r in mine], ".", label=shape)
         axis.set_xlabel(name)
+        if name == "I_D":  # a product of reciprocals
+            axis.set_xscale("log")
     axes[0, 0].set_ylabel("E [N]")
     axes[1, 0].set_ylabel("E [N]")
     axes[0, 0].legend(fontsize=7)
