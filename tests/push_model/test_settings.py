@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from grasp_opt.placement import PlacementSettings
 from push_estimation.pose_gate import PoseGateSettings
 from push_model.settings import SettingsError, bounded, from_mapping, settings
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
@@ -16,6 +17,7 @@ from push_mpc.torque_tracker import TorqueTrackerSettings
 from push_mpc.wheel_slip_nmpc import WheelSlipSettings
 from push_planner.settings import PlannerSettings
 from push_supervisor.settings import SupervisorSettings
+from sim_bridge.planar_world import PlanarSettings
 from sim_bridge.settings import BridgeSettings, MotionCaptureSettings, PhysicsSettings
 
 ALL = (
@@ -30,6 +32,8 @@ ALL = (
     ContactForceSettings,
     WheelSlipSettings,
     TorqueTrackerSettings,
+    PlanarSettings,
+    PlacementSettings,
 )
 
 
