@@ -6,9 +6,9 @@ before. Coulomb friction is bounded by its contact's normal impulse, the floor u
 its limit surface, traction by what a drive has.
 
 The floor follows the law of maximal dissipation: where it slides, the impulse is on the ellipsoid
-at the place whose normal is the motion, p = -proj(p - k A v), A being diag(F^2, F^2, T^2): at rest
-in that, p is parallel to -A v, which is (3.4). Scaling the impulse that would stop the object
-does not give that, because mass and inertia are not in the ratio of F and T.
+at the place whose normal is the motion. Its turn is p := proj(p - k A v), A being diag(F^2, F^2,
+T^2), and where that changes nothing p is parallel to -A v, which is (3.4). Scaling the impulse that
+would stop the object does not give that, because mass and inertia are not in the ratio of F and T.
 """
 
 import math
