@@ -111,7 +111,7 @@ def wheels(kind: World, robot: RobotSpec) -> tuple[float, float]:
 
 def jam(kind: World) -> tuple[float, float]:
     """A plate between a wall and a disc that presses on it: creep [mm] in 5 s; force at the wall
-    over what the disc's traction and the floor leave of it."""
+    over the disc's, the rest of which the floor takes."""
     room = EnvironmentSpec((2.0, 2.0), resolution=0.02)
     plate = replace(load_object("plate_square"), contact_friction=0.3)
     poses = {"d": np.array([1.0 - 0.35 - 0.0502, 0.03, 0.0]), "p": np.array([0.8249, 0.0, 0.0])}

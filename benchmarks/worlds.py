@@ -40,7 +40,7 @@ def crowd(make: Callable[..., Any], count: int, bumper: float) -> Any:
 
 
 def pace(make: Callable[..., Any], count: int, bumper: float, seconds: float) -> float:
-    """Simulated seconds a second of CPU, contacts read every tick."""
+    """Simulated seconds a second of CPU, contacts added up, commands and poses every tick."""
     random = np.random.default_rng(1)
     with crowd(make, count, bumper) as world:
         names = [n for n in world.names if n != "plate"]

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from grasp_opt.contact_outline import ContactOutline, Contacts
 from grasp_opt.object_trajectory import ObjectTrajectory
 from grasp_opt.tracking_cost import cone_columns, contact_at, tracking_cost
-from grasp_opt.wrench_cone import margin, task_wrenches, wrench_rays
+from grasp_opt.wrench_cone import HELD, margin, task_wrenches, wrench_rays
 from push_model.arrays import Array
 from push_model.settings import bounded, settings
 from push_model.specs import ObjectSpec
@@ -38,7 +38,7 @@ _SLOWEST = 0.05  # of the greatest pace: at rest no force would move anything
 
 
 class NoPlacement(Exception):
-    """Raised when robots do not find room beside each other."""
+    """Raised when robots find no room beside each other, or hold the task nowhere."""
 
 
 @settings
@@ -71,7 +71,7 @@ class Placement:
 
     way ``(n,)`` [m] along the outline, in the order of the outline; contacts; cost of (3.16);
     forces ``(N, n, 2)`` [N] in the object's frame; errors ``(N, 3)`` of the pose that remain;
-    margin: of the grasp-task compatibility test; evaluated: placements that were looked at.
+    margin: of the grasp-task compatibility test.
     """
 
     way: Array
@@ -80,7 +80,6 @@ class Placement:
     forces: Array
     errors: Array
     margin: float
-    evaluated: int
 
 
 class Placer:
@@ -90,7 +89,7 @@ class Placer:
     ``ContactOutline`` converts. steps ``(N, 3)`` [m, m, rad] of the task; turn ``(N, 3)``: cosine
     and sine of its headings times the pace [m], and the pace; weights ``(3,)``, force_weight: Q and
     R; scale ``(3,)``: motion at unit pace that the components of a wrench make; size: of lambdas,
-    roughly; cone: sine and cosine of the friction's angle; evaluated: placements looked at so far.
+    roughly; cone: sine and cosine of the friction's angle.
     """
 
     def __init__(
@@ -136,11 +135,9 @@ class Placer:
         self._room = tuple(np.empty((s.steps, m)) for _ in range(3))
         self._work = np.empty((4, s.steps, 9))
         self._columns, self._contacts = np.empty((3, m)), np.empty((count, 4))
-        self.evaluated = 0
 
     def cost(self, way: Array, tolerance: float = _TIGHT) -> float:
         """(3.16) of a placement ``(n,)`` [m] along the outline, over all forces."""
-        self.evaluated += 1
         u, z, new = self._room
         return float(
             _cost_at(
@@ -165,7 +162,7 @@ class Placer:
         s = self.settings
         if s.only_pushing and not self.pushes(way):
             return False
-        if s.least_margin > -1.0 and self.margin(self.outline.at(way)) < s.least_margin:
+        if s.least_margin > -1.0 and self.margin(self.outline.at(way)) < s.least_margin - HELD:
             return False
         if s.most_force >= 1e6:
             return True
@@ -232,7 +229,8 @@ class Placer:
 
         Raises
         ------
-        NoPlacement: so many robots do not fit beside each other anywhere, or hold the task nowhere.
+        NoPlacement: so many robots do not fit beside each other anywhere, or none of the cheapest
+            thousands of placements holds the task as it should.
         """
         candidates = self.grid(points) if points else self.candidates()
         if not len(candidates):
@@ -303,7 +301,6 @@ class Placer:
             self.force_scale * forces,
             np.cumsum(world - self.steps, axis=0),
             self.margin(contacts),
-            self.evaluated,
         )
 
 
@@ -315,8 +312,8 @@ def robust_placement(
     most_force: float,
     settings: PlacementSettings | None = None,
 ) -> Placement:
-    """The best placement for robots that correct errors as they push: with as much margin as there
-    is, all of them pushing, and none with more than ``most_force`` [N].
+    """The best placement for robots that correct errors as they push: with a margin of up
+    to 0.2 as far as there is one, all of them pushing, and none with more than ``most_force`` [N].
 
     Raises
     ------

@@ -241,8 +241,8 @@ class PushCurve:
         return points, heading, kappa
 
     def split(self, length: float) -> "tuple[PushCurve, PushCurve]":
-        """What comes before and after ``length`` [m], which is less than the curve's; to 1 mm or
-        so. Parts of a cubic are cubics."""
+        """What comes before and after ``length`` [m], which is less than the curve's; to a
+        hundredth of the curve's. Parts of a cubic are cubics."""
         points, heading, _ = self.sample(_DENSE)
         way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
         k = min(max(1, int(np.searchsorted(way, length))), _DENSE - 2)

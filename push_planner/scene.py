@@ -31,6 +31,7 @@ from push_planner.settings import PlannerSettings
 _OUTLINE_SPACING = 0.01  # [m] of points between which distances are interpolated
 _LEAVING = 0.15  # [m] of the first push, in which it may be nearer to obstacles than later
 _LEAST = 0.003  # [m] that the robot keeps even then
+_APART = 0.005  # [m] between poses of the robot that are looked at by themselves
 _TURNING = 0.25  # of the safety distance that it keeps where it turns, before a push
 
 
@@ -163,8 +164,8 @@ class PushScene:
     def leaving(self, pose: Array) -> float:
         """[m] kept on the way out of a start pose ``(3,)``: all that there is, where that is less
         than the safety distance. Somebody has put the object there."""
-        there = self.object_clearance(pose) - 1.2 * SWEEP_LOSS
-        return max(1e-4, min(self.settings.safety_distance, there))
+        there, needed = self.object_clearance(pose), self.settings.safety_distance
+        return needed if there >= needed else max(1e-4, there - 1.2 * SWEEP_LOSS)
 
     def robot_keeps(self, leaving: float = math.inf) -> float:
         """[m] that the robot keeps where it comes to contact; see ``leaving``."""
@@ -183,10 +184,16 @@ class PushScene:
         if curve.length > _LEAVING:
             first, rest = curve.split(_LEAVING)
         clearance = self.curve_clearance(first, side, leaving)
-        if clearance < leaving:
+        if clearance < leaving or self._robot_along(first) < self.robot_keeps(leaving):
             return None
         beyond = needed if rest is None else self.curve_clearance(rest, side, needed)
         return None if beyond < needed else min(clearance, beyond)
+
+    def _robot_along(self, curve: PushCurve) -> float:
+        """[m] clearance of the robot alone on a curve, at poses a few millimetres apart."""
+        points, heading, _ = curve.sample(max(3, int(curve.length / _APART)))
+        poses = np.column_stack([points, heading])
+        return min(self.robot_clearance(pose) for pose in poses)
 
     def back(self, side: PushSide) -> float:
         """[m] from contact with a side to where the robot may turn: out of a recess, and on."""

@@ -31,11 +31,16 @@ class Footing:
     def along(self, name: str, by: Array, poses: Mapping[str, Array]) -> tuple[Array, str | None]:
         """Where a body that is shoved from where it is comes to, and what stops it.
 
-        by: ``(3,)`` [m, m, rad] along the world's axes.
+        by: ``(3,)`` [m, m, rad] along the world's axes. Whom it overlaps already it may leave.
         """
         start = poses[name]
         steps = max(1, int(max(abs(by[0]), abs(by[1])) / _STEP), int(abs(by[2]) / _TURN))
-        others = self._others(name, poses)
+        here = self._footprint(name, start)
+        others = [
+            other
+            for other in self._others(name, poses)
+            if not (here.meets(other, TOUCH) and by[:2] @ (here.centre - other.centre) > 0.0)
+        ]
         reached, trouble = start, None
         for k in range(1, steps + 1):
             pose = start + (k / steps) * by

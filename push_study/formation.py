@@ -30,11 +30,11 @@ _MARGIN = 0.8  # [m] about the trajectory
 class FormationPush:
     """What became of a push.
 
-    displacement: delta of (3.2). energy: E of (3.3) [N]. success: whether every pusher kept its
-    contact all the way, and the object its trajectory. widest: [m] greatest gap. astray: [m]
-    greatest distance from where the object was to be. position, orientation: [m], [rad] of it at
-    the end. objects ``(t, 3)``, agents ``(t, n, 2)``; forces ``(t - 1, n, 2)`` [N] on the
-    object.
+    displacement: delta of (3.2), over the length of the trajectory. energy: E of (3.3) [N].
+    success: whether every pusher kept its contact, from half a second on, and the object its
+    trajectory. widest: [m] greatest gap then. astray: [m] greatest distance from where the object
+    was to be. position, orientation: [m], [rad] of it at the end. objects ``(t, 3)``, agents ``(t,
+    n, 2)``; forces ``(t - 1, n, 2)`` [N] on the object.
     """
 
     displacement: float

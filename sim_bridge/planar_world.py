@@ -21,6 +21,7 @@ from sim_bridge.planar.constraints import HOLONOMIC
 from sim_bridge.planar.shapes import Part, body_parts, fixed_parts
 from sim_bridge.planar.solve import advance
 from sim_bridge.planar.tables import (
+    grown,
     make_bodies,
     make_contacts,
     make_parts,
@@ -33,7 +34,7 @@ from sim_bridge.world import BodyPoses, Contact, WheelState
 from sim_bridge.worlds import Objects, Robots, WorldKind, steps_of
 
 _FEW = 12  # robots that are commanded one by one
-_CONTACTS = 8  # a part at most, on average
+_CONTACTS = 8  # a part, for which there is room at first
 
 
 @settings
@@ -88,6 +89,7 @@ class PlanarWorld:
         self._off_centre = bool(self._centres.any())
         self._parts, self._near = make_parts(parts, [part for _, part in fixed])
         most = _CONTACTS * (len(parts) + 8)
+        self._largest = float(self._parts.radius[: len(parts)].max(initial=0.0))
         self._contacts = make_contacts(most)
         self._sums = make_sums(most)
         self._drives = [robot.drive for robot, _ in robots.values()]
@@ -211,19 +213,24 @@ class PlanarWorld:
 
     def step(self, count: int = 1, contacts: bool = True) -> None:
         """Advance by physics steps; contacts of every step are added up until they are read."""
-        s = self.physics
-        advance(
-            count,
-            s.time_step,
-            s.solver_iterations,
-            s.tolerance,
-            self._bodies,
-            self._parts,
-            self._near,
-            self._contacts,
-            self._sums,
-            contacts,
-        )
+        s, left = self.physics, count
+        while left > 0:
+            left -= advance(
+                left,
+                s.time_step,
+                s.solver_iterations,
+                s.tolerance,
+                self._bodies,
+                self._parts,
+                self._near,
+                self._contacts,
+                self._sums,
+                contacts,
+                self._largest,
+            )
+            if left > 0:  # there was no room for all contacts
+                self._contacts = grown(self._contacts)
+                self._sums = grown(self._sums)
 
     def read_contacts(self) -> list[Contact]:
         """Contacts since the last reading, averaged over its steps."""

@@ -28,6 +28,7 @@ FAR, TURN = 0.04, 0.12
 POSITION, ORIENTATION = 0.01, 0.05
 """[m], [rad] within which a trial succeeds."""
 _WHEN = (12.0, 30.0)  # [s] of sim time from which on; the first push begins at about 8 s
+_TRIES = 10_000  # draws of a move
 _PATIENCE = 300.0  # [s] of sim time
 
 
@@ -60,7 +61,8 @@ def tasks(options: StudyOptions) -> list[DisplacedTask]:
 class Hand:
     """Moves the object once, while it is pushed; to where nothing else is, and on a free way.
 
-    moved: what it did, None as long as it has done nothing.
+    moved: what it set about to do, None as long as it has done nothing. The world moves it at its
+    next tick, as far as nothing is in the way then.
     """
 
     def __init__(self, scenario: Scenario, seed: int) -> None:
@@ -85,13 +87,19 @@ class Hand:
             run.bridge.disturb(self.moved)
 
     def draw(self, poses: Mapping[str, Array]) -> tuple[float, float, float]:
-        """dx, dy, dtheta [m, m, rad], evenly over those that poses ``(3,)`` of all bodies leave."""
-        while True:
+        """dx, dy, dtheta [m, m, rad], evenly over those that poses ``(3,)`` of all bodies leave.
+
+        Raises
+        ------
+        RuntimeError: they leave hardly any.
+        """
+        for _ in range(_TRIES):
             angle, far = self._random.uniform(-np.pi, np.pi), FAR * np.sqrt(self._random.uniform())
             turn = self._random.uniform(-TURN, TURN)
             by = np.array([far * np.cos(angle), far * np.sin(angle), turn])
             if self._footing.along(self.item, by, poses)[1] is None:
                 return float(by[0]), float(by[1]), float(by[2])
+        raise RuntimeError(f"nowhere is room to move {self.item} to")
 
 
 def trial(task: DisplacedTask) -> Row:

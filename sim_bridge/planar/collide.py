@@ -12,8 +12,6 @@ from typing import Any, NamedTuple
 
 import numba
 
-BODY_A, BODY_B, PART_A, PART_B, FEATURE = range(5)
-NX, NY, PX, PY, GAP, FRICTION = range(6)
 _FAR = 1e18
 
 
@@ -191,8 +189,7 @@ def _polygons(
         # the incident edge runs against the reference edge: s0 > s1
         t0 = min(1.0, max(0.0, (high - s0) / (s1 - s0) if s0 > high else 0.0))
         t1 = max(0.0, min(1.0, (low - s0) / (s1 - s0) if s1 < low else 1.0))
-        if t0 > t1:  # beside each other: the nearer corner
-            t0 = t1 = 0.0 if s0 <= high and s0 >= low else 1.0
+        if t1 - t0 < 1e-9:  # beside each other: one corner
             points = 1
     sign = 1.0 if flip else -1.0  # normal from b to a; n points out of the reference
     for which in range(points):

@@ -156,12 +156,12 @@ def _traction(
         px, py = px * shorter, py * shorter
     limit = most[i, 1] * dt
     pt = min(limit, max(-limit, given[i, 2] + (turn - velocity[i, 2]) / ij))
-    dx, dy = px - given[i, 0], py - given[i, 1]
+    dx, dy, spin = px - given[i, 0], py - given[i, 1], pt - given[i, 2]
     velocity[i, 0] += im * dx
     velocity[i, 1] += im * dy
-    velocity[i, 2] += ij * (pt - given[i, 2])
+    velocity[i, 2] += ij * spin
     given[i, 0], given[i, 1], given[i, 2] = px, py, pt
-    return float(max(abs(dx), abs(dy)))
+    return float(max(abs(dx), abs(dy), abs(spin) * most[i, 0] / most[i, 1]))
 
 
 @numba.njit(cache=True, error_model="numpy")

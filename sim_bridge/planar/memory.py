@@ -44,6 +44,17 @@ def _slot(key: int, mask: int) -> int:
 
 
 @numba.njit(cache=True, error_model="numpy")
+def rehash(keys: Any, number: Any, table: Any) -> None:
+    """Fill an empty table with the rows of the first ``number[0]`` keys."""
+    mask = table.shape[0] - 1
+    for row in range(number[0]):
+        slot = _slot(keys[row], mask)
+        while table[slot] >= 0:
+            slot = (slot + 1) & mask
+        table[slot] = row
+
+
+@numba.njit(cache=True, error_model="numpy")
 def match(c: Contacts, n: int, wide: int) -> None:
     """Impulses of the last step to the contacts of this one; then keep this one's keys."""
     ints, keys, impulse, table = c.ints, c.keys, c.impulse, c.table
@@ -105,8 +116,6 @@ def add_up(c: Contacts, n: int, bodies: int, moving: int, sums: Sums, dt: float)
         row = table[slot]
         if row < 0:
             row = number[0]
-            if row >= keys.shape[0]:
-                continue
             table[slot] = row
             keys[row] = key
             values[row, :] = 0.0

@@ -9,20 +9,42 @@ from sim_bridge.planar.collide import Neighbours, Parts, find_contacts, place_pa
 from sim_bridge.planar.constraints import OBJECT, Bodies, again, prepare, turns
 from sim_bridge.planar.memory import Contacts, Sums, add_up, keep, match
 
-_MARGIN = 1e-3  # [m] within which contacts are found
+_MARGIN = 1e-3  # [m] within which contacts are found at least
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _reach(b: Bodies, radius: float, dt: float) -> float:
+    """[m] within which contacts must be found, so that nobody meets another within a step."""
+    fastest, widest = 0.0, 0.0
+    for i in range(b.pose.shape[0]):
+        if b.there[i]:
+            v = max(
+                math.hypot(b.velocity[i, 0], b.velocity[i, 1]),
+                math.hypot(b.target[i, 0], b.target[i, 1]),
+            )
+            fastest = max(fastest, v)
+            widest = max(widest, abs(b.velocity[i, 2]), abs(b.target[i, 2]))
+    return max(_MARGIN, 2.0 * dt * (fastest + widest * radius))
 
 
 @numba.njit(cache=True, error_model="numpy")
 def advance(
     steps: int, dt: float, iterations: int, tolerance: float, b: Bodies, parts: Parts,
-    near: Neighbours, c: Contacts, sums: Sums, summed: bool,
-) -> None:  # fmt: skip
-    """Steps of dt [s]; iterations end before when no impulse changes by tolerance [N] dt."""
+    near: Neighbours, c: Contacts, sums: Sums, summed: bool, radius: float,
+) -> int:  # fmt: skip
+    """Steps of dt [s]; turns end before ``iterations`` when no impulse changes by tolerance [N] dt.
+
+    radius: [m] of the largest part. Returns how many steps were made: fewer where there is no room
+    for all contacts, and then nothing has been done yet of the next one.
+    """
     bodies = b.pose.shape[0]
     cosine, sine = np.ones(bodies), np.zeros(bodies)
-    for _ in range(steps):
+    for done in range(steps):
         place_parts(b.pose, parts)
-        n = find_contacts(c.ints, c.reals, parts, near, b.there, _MARGIN)
+        margin = _reach(b, radius, dt)
+        n = find_contacts(c.ints, c.reals, parts, near, b.there, margin)
+        if n >= c.ints.shape[0] or (summed and sums.number[0] + n > sums.keys.shape[0]):
+            return done
         match(c, n, parts.body.shape[0])
         for i in range(bodies):
             if b.there[i] and b.kind[i] != OBJECT:
@@ -40,3 +62,4 @@ def advance(
             if b.there[i]:
                 for j in range(3):
                     b.pose[i, j] += dt * b.velocity[i, j]
+    return steps

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -13,13 +14,14 @@ from push_model.settings import SettingsError
 from push_model.specs import ObjectSpec, RobotSpec
 from sim_bridge.planar.collide import Neighbours, Parts
 from sim_bridge.planar.constraints import HOLONOMIC, OBJECT, WHEELS, Bodies
-from sim_bridge.planar.memory import Contacts, Sums
+from sim_bridge.planar.memory import Contacts, Sums, rehash
 from sim_bridge.planar.shapes import Buckets, Part, PartTable, body_parts
 
 _ROBOT_FRICTION = 1.0  # as PyBullet's robots: that of a contact is what they touch
 _LARGE = 2.5  # times the median radius: parts that all others are held against
 _LEVER = 2.0 / 3.0  # of its radius at which a disc's traction turns it
 
+Table = TypeVar("Table", Contacts, Sums)
 Row = tuple[
     int, float, float, tuple[float, float], tuple[float, float], tuple[float, float], object
 ]
@@ -145,6 +147,19 @@ def make_sums(most: int) -> Sums:
         np.zeros(2, dtype=np.int64),
         _table(most),
     )
+
+
+def grown(table: Table) -> Table:
+    """Contacts or sums with twice the room, and all that is in them."""
+    if isinstance(table, Contacts):
+        larger: Table = make_contacts(2 * len(table.keys))
+    else:
+        larger = make_sums(2 * len(table.keys))
+    for name, old, new in zip(table._fields, table, larger, strict=True):
+        if name != "table":
+            new[: len(old)] = old
+    rehash(larger.old if isinstance(larger, Contacts) else larger.keys, larger.number, larger.table)
+    return larger
 
 
 def object_row(item: ObjectSpec) -> Row:

@@ -60,7 +60,10 @@ def test_random_grasps_meet_their_requirements_and_cover_what_they_may(name):
         angles += list(np.arctan2(*contacts.normals.T[::-1]))
     # the whole half circle about the velocity where the outline has such normals
     spread = np.ptp(angles)
-    assert spread > (2.9 if name == "plate_ellipse" else 1.0) or name == "plate_triangle"
+    if name == "plate_triangle":  # one side looks that way
+        assert spread == pytest.approx(0.0, abs=1e-9)
+    else:
+        assert spread > (2.9 if name == "plate_ellipse" else 1.0)
 
 
 def test_what_has_no_place_is_said_so():

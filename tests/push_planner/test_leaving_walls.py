@@ -52,7 +52,7 @@ def test_it_keeps_what_it_has_and_then_the_safety_distance(robot, box):
             try:
                 plan = planner.solve(start, GOAL)
                 found = [*found, plan.segments[0]]
-                assert plan.clearance >= min(0.0, had) and found
+                assert plan.clearance > 0.0
                 for later in plan.segments[1:]:
                     assert min(map(np.min, exact(planner, later)[1:])) > 0.012 - 1e-3
             except PlanningFailed as error:
@@ -63,7 +63,8 @@ def test_it_keeps_what_it_has_and_then_the_safety_distance(robot, box):
     closest = np.inf
     for had, push in pushes:
         way, item, body = exact(planner, push)
-        assert min(item.min(), body.min()) > had - 2.5e-3
+        assert item.min() > max(0.0, had - 2.5e-3)
+        assert body.min() > 0.003 - 1e-3  # the robot keeps 3 mm, whatever the object has
         late = way > 0.16
         if late.any():
             assert min(item[late].min(), body[late].min()) > 0.012 - 1e-3

@@ -93,3 +93,13 @@ def test_shoves_end_before_anything_and_nowhere_short_of_it():
                 for f in np.linspace(part, farther, 50)
             )
     assert 80 < stopped < 190
+
+
+def test_a_body_leaves_whom_it_overlaps_and_goes_no_deeper():
+    scenario, poses = crowd()
+    footing = Footing(scenario)
+    poses["box"] = np.array([0.05 + 0.045 - 0.0018, 0.0, 0.0])  # 1.8 mm in the bumper of a
+    pose, trouble = footing.along("box", np.array([0.03, 0.0, 0.0]), poses)
+    assert trouble is None and pose[0] == pytest.approx(poses["box"][0] + 0.03)
+    pose, trouble = footing.along("box", np.array([-0.03, 0.0, 0.0]), poses)
+    assert trouble == "in a" and np.array_equal(pose, poses["box"])
