@@ -9,6 +9,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from planar_push.words import hear_signals
 from push_bringup.failures import DomainInUse, SuiteFailed
 from push_model.settings import SettingsError
 from push_ros.process import prepare_environment
@@ -55,7 +56,11 @@ def main(words: Sequence[str] | None = None) -> int:
 def command() -> None:
     """Entry point of the process. It leaves at once: to take down all that was imported costs a
     second, several on a busy machine, in which a signal would seem not to be heard."""
-    code = main()
+    hear_signals()
+    try:
+        code = main()
+    except KeyboardInterrupt:
+        code = 130
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(code)

@@ -78,14 +78,35 @@ def whole(least: int) -> Callable[[str], int]:
     return parse
 
 
+_asked: list[int] = []  # signals that came before anybody was there to be stopped
+
+
+def hear_signals() -> None:
+    """From the first moment on SIGINT and SIGTERM interrupt what is being done, and are remembered.
+
+    Where an interrupt ends up in a finaliser or a callback Python drops it, and a start-up that
+    went on would never be told again.
+    """
+
+    def handler(number: int, frame: object) -> None:
+        _asked.append(number)
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGINT, handler)
+    signal.signal(signal.SIGTERM, handler)
+
+
 def stop_on_signals(request_stop: Callable[[], None]) -> None:
-    """SIGINT and SIGTERM call a function, as long as nobody says otherwise."""
+    """SIGINT and SIGTERM call a function, as long as nobody says otherwise; at once when one has
+    come already."""
 
     def handler(number: int, frame: object) -> None:
         request_stop()
 
     signal.signal(signal.SIGINT, handler)
     signal.signal(signal.SIGTERM, handler)
+    if _asked:
+        request_stop()
 
 
 def tell(event: JobEvent) -> None:

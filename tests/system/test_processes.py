@@ -120,10 +120,13 @@ def test_signals_at_random_moments(domain, number, seed, tmp_path):
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
-    time.sleep(moment)
-    children = children_of(process.pid)
-    process.send_signal(number)
-    process.wait(5.0)
+    try:
+        time.sleep(moment)
+        children = children_of(process.pid)
+        process.send_signal(number)
+        process.wait(5.0)
+    finally:
+        process.kill()  # children die with it
     time.sleep(0.1)
     assert not running(children)
     if (tmp_path / "bag").exists():

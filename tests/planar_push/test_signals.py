@@ -1,0 +1,60 @@
+"""Signals before anything runs: they interrupt, and are not forgotten where that is swallowed."""
+
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from planar_push import words
+
+
+@pytest.fixture
+def handlers():
+    before = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+    words._asked.clear()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_that_something_swallowed_stops_what_is_started_later(handlers, number):
+    words.hear_signals()
+    with pytest.raises(KeyboardInterrupt):
+        os.kill(os.getpid(), number)
+    stopped = []
+    words.stop_on_signals(lambda: stopped.append(True))
+    assert stopped == [True]
+    os.kill(os.getpid(), number)
+    assert stopped == [True, True]
+
+
+def test_without_a_signal_nothing_is_stopped(handlers):
+    words.hear_signals()
+    stopped = []
+    words.stop_on_signals(lambda: stopped.append(True))
+    assert not stopped
+
+
+SWALLOW = """
+import os, signal, sys
+from planar_push import launch, main
+import push_bringup.preparation as preparation
+class Dropped:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIG{name})
+def check(namespace="", context=None):
+    Dropped()  # Python says "Exception ignored in", and goes on
+preparation.check_domain = check
+sys.argv[1:] = ["launch", "single", "--scenario", "short"]
+main.command()
+"""
+
+
+@pytest.mark.parametrize("name", ["INT", "TERM"])
+def test_a_launch_that_lost_its_interrupt_starts_nothing_and_ends(name):
+    line = [sys.executable, "-c", SWALLOW.format(name=name)]
+    done = subprocess.run(line, capture_output=True, text=True, timeout=60.0)
+    assert "Exception ignored" in done.stderr and done.returncode == 0, done.stderr
