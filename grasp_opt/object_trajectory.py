@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from push_model.arrays import Array
+from push_model.trajectory import ramp
 
 _FINE = 2000  # samples of a curve by which its length is measured
 _STEP = 0.02  # [s]
@@ -57,21 +58,8 @@ def along(
     fine = curve(u)
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(fine[:, :2], axis=0).T))])
     total = float(way[-1])
-    top = min(speed, math.sqrt(total * acceleration))
-    rise = top / acceleration
-    duration = total / top + rise
-    time = np.linspace(0.0, duration, max(20, math.ceil(duration / _STEP) + 1))
-    back = duration - time
-    s = np.where(
-        time < rise,
-        0.5 * acceleration * time**2,
-        np.where(
-            back < rise,
-            total - 0.5 * acceleration * back**2,
-            0.5 * top * rise + top * (time - rise),
-        ),
-    )
-    rate = np.clip(np.minimum(time, back) * acceleration, 0.0, top)
+    sampled, rate = ramp(total, speed, acceleration, _STEP)
+    time, s = sampled.T
     at = np.interp(np.clip(s, 0.0, total), way, u)
     step = 1e-4 * end
     slope = (curve(at + step) - curve(at - step)) / (2.0 * step)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from grasp_opt.contact_outline import ContactOutline, Contacts
 from grasp_opt.object_trajectory import ObjectTrajectory
+from grasp_opt.selection import apart
 from grasp_opt.tracking_cost import cone_columns, contact_at, tracking_cost
 from grasp_opt.wrench_cone import HELD, margin, task_wrenches, wrench_rays
 from push_model.arrays import Array
@@ -152,10 +153,7 @@ class Placer:
         s, contacts = self.settings, self.outline.at(way)
         if self.outline.from_corner(way).min() < s.corner:
             return False
-        centres = contacts.centres(self.radius)
-        away = np.hypot(*(centres[:, None] - centres[None]).transpose(2, 0, 1))
-        near = away[np.triu_indices(len(way), 1)]
-        return bool(near.size == 0 or near.min() >= 2.0 * self.radius + s.gap)
+        return apart(contacts, self.radius, s.gap)
 
     def holds(self, way: Array) -> bool:
         """Whether a placement has the margin, and asks no robot for more force than it has."""

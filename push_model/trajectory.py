@@ -57,8 +57,12 @@ class Trajectory:
         return pose, twist
 
 
-def _ramp(distance: float, top: float, acceleration: float, step: float) -> tuple[Array, Array]:
-    """Travelled way and speed (n,) of a trapezoidal rest-to-rest motion sampled every step [s]."""
+def ramp(distance: float, top: float, acceleration: float, step: float) -> tuple[Array, Array]:
+    """A trapezoidal rest-to-rest motion over a distance [m], sampled every ``step`` [s] or less.
+
+    top, acceleration: at most, [m/s], [m/s^2] (or with angles instead of lengths). Returns time [s]
+    and way [m] ``(n, 2)``, and speed [m/s] ``(n,)``.
+    """
     peak = min(top, math.sqrt(distance * acceleration))
     rise = peak / acceleration
     cruise = max(0.0, distance / peak - rise)
@@ -82,7 +86,7 @@ def line(
     start: Array, distance: float, speed: float, acceleration: float, step: float = 0.05
 ) -> Trajectory:
     """Straight ahead from a pose ``(3,)``; backwards for a negative distance [m]."""
-    way, rate = _ramp(max(abs(distance), 1e-6), speed, acceleration, step)
+    way, rate = ramp(max(abs(distance), 1e-6), speed, acceleration, step)
     sign = math.copysign(1.0, distance)
     pose = np.column_stack(
         [
@@ -98,7 +102,7 @@ def rotation(
     start: Array, angle: float, turn_rate: float, acceleration: float, step: float = 0.05
 ) -> Trajectory:
     """On the spot from a pose ``(3,)`` by an angle [rad]."""
-    way, rate = _ramp(max(abs(angle), 1e-6), turn_rate, acceleration, step)
+    way, rate = ramp(max(abs(angle), 1e-6), turn_rate, acceleration, step)
     sign = math.copysign(1.0, angle)
     pose = np.column_stack(
         [np.full(len(way), start[0]), np.full(len(way), start[1]), start[2] + sign * way[:, 1]]

@@ -1,6 +1,5 @@
 """Discs that push an object as one rigid formation, in any world: the simulation of 3.1.4."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -67,11 +66,10 @@ def push(
     trajectory: ObjectTrajectory,
     radius: float,
     world: str = "pybullet",
-    seen: Callable[[World], None] | None = None,
 ) -> FormationPush:
     """Push an object along a trajectory with discs at its contacts, without any feedback.
 
-    contacts, trajectory: about the centre of mass. seen: is shown the world after every tick.
+    contacts, trajectory: about the centre of mass. radius: [m] of the discs. world: its kind.
     """
     low, high = trajectory.pose[:, :2].min(axis=0), trajectory.pose[:, :2].max(axis=0)
     size = 2.0 * (np.maximum(np.abs(low), np.abs(high)) + _MARGIN)
@@ -106,8 +104,6 @@ def push(
             astray = max(astray, float(np.hypot(*(here - after)[:2])))
             if tick * _TICK > 0.5:
                 widest = max(widest, float(_gaps(item, here, now, radius).max()))
-            if seen is not None:
-                seen(running)
     finally:
         running.close()
     way, felt = np.array(objects), np.array(forces)

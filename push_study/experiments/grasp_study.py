@@ -103,8 +103,10 @@ def predictors(item: ObjectSpec, contacts: Contacts, trajectory: ObjectTrajector
     """What can be said of a grasp before it pushes."""
     surface, mu = item.limit_surface(), item.contact_friction
     points, normals, twists = contacts.points, contacts.normals, trajectory.body_twists
-    row: Row = {"composed": float(composed_quality(points, normals)), "extension": 0.0}
-    row["extension"] = float(extension(points))
+    row: Row = {
+        "composed": float(composed_quality(points, normals)),
+        "extension": float(extension(points)),
+    }
     for suffix, length in (("", surface.radius), ("_printed", 1.0)):
         rays = wrench_rays(points, normals, mu, length, bisectors=True)
         wrenches = task_wrenches(twists, surface, length)

@@ -16,11 +16,11 @@ START = {"a": [0.0, 0.0, 0.0], "b": [0.4, 0.0, 0.0]}
 BOX = [0.0, 0.5, 0.0]
 
 
-def crowd(robots=START, box=BOX):
+def crowd():
     values = {
         "environment": WALLS,
-        "robots": {n: {"type": "epuck", "start": p} for n, p in robots.items()},
-        "objects": {"box": {"type": "box9", "start": box}},
+        "robots": {n: {"type": "epuck", "start": p} for n, p in START.items()},
+        "objects": {"box": {"type": "box9", "start": BOX}},
     }
     scenario = scenario_from_mapping(values, "s", "s.yaml")
     bodies = scenario.robots | scenario.objects
