@@ -18,6 +18,9 @@ class SpeedDrive(DifferentialDrive):
     max_wheel_speed: float = bounded(low=1e-2, high=100.0, doc="[rad/s]")
     wheel_mass: float = bounded(low=1e-4, high=50.0, doc="[kg] of one wheel")
     wheel_torque: float = bounded(low=1e-4, high=100.0, doc="[Nm] greatest motor torque")
+    wheel_inertia: float = bounded(
+        0.0, low=0.0, high=100.0, doc="[kg m^2] about the axle, with its geared motor; 0: a ball's"
+    )
     wheel_friction: float = bounded(1.0, low=0.0, high=3.0, doc="wheel on floor")
 
 

@@ -79,6 +79,12 @@ class WheeledBody:
             )
             set_group(client, self.body, link, BODY if link == _BASE else SUPPORT)
 
+    def set_inertia(self, link: int, diagonal: list[float]) -> None:
+        """Of a link (-1: the body), [kg m^2] about its axes; else PyBullet takes its shape's."""
+        pb.changeDynamics(
+            self.body, link, localInertiaDiagonal=diagonal, physicsClientId=self._client
+        )
+
     def put(self, pose: Array) -> None:
         """Put the axle midpoint at a pose ``(3,)``, at rest."""
         height = self._radius + COM_HEIGHT + 1e-4

@@ -1,9 +1,13 @@
-"""A robot whose wheels hold the speeds that they are told, as an e-puck's."""
+"""A robot whose wheels hold the speeds that they are told, as an e-puck's.
+
+A wheel without the inertia of its motor is so light against the body that PyBullet's friction is
+not opposite to its slip: an axle whose wheels slip is squeezed, not driven (docs/physics.md).
+"""
 
 from push_model.arrays import Array
 from push_model.drives import SpeedDrive
 from push_model.specs import RobotSpec
-from sim_bridge.robot_body import WheeledBody
+from sim_bridge.robot_body import WHEELS, WheeledBody
 from sim_bridge.wheeled_urdf import Wheels
 
 
@@ -15,6 +19,9 @@ class SpeedBody(WheeledBody):
         roll = drive.wheel_mass * drive.wheel_radius**2 / 2.0
         wheels = Wheels(drive.wheel_radius, drive.half_track, drive.wheel_mass, (roll, roll))
         super().__init__(client, spec, wheels, drive.wheel_friction)
+        if drive.wheel_inertia > 0.0:
+            for wheel in WHEELS:
+                self.set_inertia(wheel, [roll, drive.wheel_inertia, roll])
         self.place(start)
 
     def place(self, pose: Array) -> None:

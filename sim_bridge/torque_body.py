@@ -33,15 +33,10 @@ class TorqueBody(WheeledBody):
         """PyBullet takes inertias from the shapes; under torques it is those given that count."""
         along, across = wheels.inertia
         for wheel in WHEELS:
-            self._inertia(wheel, [across, along, across])
+            self.set_inertia(wheel, [across, along, across])
         if spec.inertia is not None:
             ixx, iyy, _ = pb.getDynamicsInfo(self.body, -1, physicsClientId=self._client)[2]
-            self._inertia(-1, [ixx, iyy, spec.inertia])
-
-    def _inertia(self, link: int, diagonal: list[float]) -> None:
-        pb.changeDynamics(
-            self.body, link, localInertiaDiagonal=diagonal, physicsClientId=self._client
-        )
+            self.set_inertia(-1, [ixx, iyy, spec.inertia])
 
     def place(self, pose: Array) -> None:
         """Put the axle midpoint at a pose ``(3,)``, at rest."""

@@ -207,7 +207,7 @@ def test_a_ring_touches_all_round_at_its_height():
             (contact,) = [c for c in world.read_contacts() if "b" in (c.body_a, c.body_b)]
             sign = 1.0 if contact.body_a == "b" else -1.0
             assert sign * contact.normal[0] == pytest.approx(-1.0, abs=0.01)
-            assert contact.position[2] == pytest.approx(0.01, abs=0.0035)
+            assert contact.position[2] == pytest.approx(ring.bumper_z, abs=0.0035)
 
 
 def test_the_killed_stand_and_the_removed_are_gone_until_the_reset(robot):

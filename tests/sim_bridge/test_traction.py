@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from push_model.bumpers import FlatBumper
+from push_model.drives import SpeedDrive
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
 from push_model.traction import lift_share, push_force, too_heavy, traction, wheel_load
 from push_scenario.scenario import scenario_from_mapping
@@ -111,3 +112,21 @@ def test_loads_balance():
     assert traction(weak, 0.01) == pytest.approx(2 * 0.001 / 0.0205)
     blunt = replace(robot, bumper=FlatBumper(0.07, 0.05, z=0.002), casters=())
     assert wheel_load(blunt, 0.5) == pytest.approx(1.962 - 0.5 * 0.002 / robot.body_radius)
+
+
+@pytest.mark.parametrize("turn_rate", [-2.0, -1.4, 1.0, 2.0])
+def test_wheels_that_slip_keep_their_traction(turn_rate: float) -> None:
+    """Both wheels slip forward, each at its own speed: friction is opposite to slip, so that none
+    of it is left to squeeze the axle, and the robot pushes the wall with all of it."""
+    robot = types("epuck_ring")[0]
+    drive = robot.drive
+    assert isinstance(drive, SpeedDrive) and drive.wheel_inertia > 0.0
+    start = np.array([0.5 * OPEN.size[0] - robot.push_distance - 1e-3, 0.0, 0.0])
+    felt = []
+    with PyBulletWorld(OPEN, {"r": (robot, start)}, {}) as world:
+        world.command("r", 0.08, turn_rate)
+        for _ in range(12):
+            world.step(20)
+            felt.append(sum(abs(c.force[0]) for c in world.read_contacts()))
+    # The wall's friction presses the robot down a little: it has no less than its weight gives.
+    assert drive.wheel_friction * robot.mass * 9.81 < np.mean(felt[4:])
