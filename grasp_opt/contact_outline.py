@@ -89,6 +89,16 @@ class ContactOutline:
         nearest: Array = np.minimum(gap, self.length - gap).min(axis=-1)
         return nearest
 
+    def nearest(self, points: Array) -> tuple[Array, Array]:
+        """Ways ``(n,)`` [m] along the outline to what is nearest to points ``(n, 2)``, and how far
+        [m] that is."""
+        to = np.asarray(points, dtype=np.float64)[:, None] - self._starts
+        part = np.clip((to * self._edges).sum(axis=2) / self._lengths**2, 0.0, 1.0)
+        away = np.linalg.norm(to - part[:, :, None] * self._edges, axis=2)
+        k = np.argmin(away, axis=1)
+        rows = np.arange(len(k))
+        return self._way[k] + part[rows, k] * self._lengths[k], away[rows, k]
+
     def way_of_angle(self, theta: Array) -> Array:
         """``(n,)`` [m] along the outline of the points at polar angles theta ``(n,)`` [rad].
 

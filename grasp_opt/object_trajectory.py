@@ -46,6 +46,12 @@ class ObjectTrajectory:
         """Pose ``(3,)`` at a time [s]; at rest beyond the ends."""
         return np.array([np.interp(t, self.time, column) for column in self.pose.T])
 
+    def twist_at(self, t: float) -> Array:
+        """Twist ``(3,)`` at a time [s]; at rest beyond the ends."""
+        if not 0.0 <= t <= self.duration:
+            return np.zeros(3)
+        return np.array([np.interp(t, self.time, column) for column in self.twist.T])
+
 
 def along(
     curve: Callable[[Array], Array], end: float, speed: float, acceleration: float
@@ -69,26 +75,35 @@ def along(
 
 
 def polynomial(
-    coefficients: Sequence[float], length: float, speed: float, acceleration: float
+    coefficients: Sequence[float],
+    length: float,
+    speed: float,
+    acceleration: float,
+    heading: float = 0.0,
 ) -> ObjectTrajectory:
-    """y = sum c_k x^(k + 2) for x from 0 to length [m]; the heading is that of the way."""
+    """y = sum c_k x^(k + 2) for x from 0 to length [m]; the heading [rad] is against the way."""
 
     def curve(x: Array) -> Array:
         y = sum(c * x ** (k + 2) for k, c in enumerate(coefficients))
         slope = sum((k + 2) * c * x ** (k + 1) for k, c in enumerate(coefficients))
-        return np.column_stack([x, y + 0.0 * x, np.arctan(slope + 0.0 * x)])
+        return np.column_stack([x, y + 0.0 * x, np.arctan(slope + 0.0 * x) + heading])
 
     return along(curve, length, speed, acceleration)
 
 
 def sinusoid(
-    amplitude: float, wavelength: float, length: float, speed: float, acceleration: float
+    amplitude: float,
+    wavelength: float,
+    length: float,
+    speed: float,
+    acceleration: float,
+    heading: float = 0.0,
 ) -> ObjectTrajectory:
-    """y = amplitude sin(2 pi x / wavelength) [m], the heading constant."""
+    """y = amplitude sin(2 pi x / wavelength) [m], the heading [rad] constant."""
 
     def curve(x: Array) -> Array:
         y = amplitude * np.sin(2.0 * math.pi * x / wavelength)
-        return np.column_stack([x, y, np.zeros_like(x)])
+        return np.column_stack([x, y, np.full_like(x, heading)])
 
     return along(curve, length, speed, acceleration)
 

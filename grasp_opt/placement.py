@@ -33,7 +33,7 @@ _LOOSE, _TIGHT = 1e-4, 1e-7  # relative gaps of costs, on the grid and after it
 _COARSE, _FINEST = 4e-3, 2e-4  # [m] of the refinement, of all and of the best of them
 _WORTH, _FINALLY = 1e-3, 1e-6  # of the cost that a step must save, likewise
 _LAST = 3  # refined to the end
-_MARGINS = (0.2, 0.15, 0.1, 0.05, 0.0)  # that are asked for, one after another
+_MARGINS = (0.1, 0.05, 0.0)  # that are asked for, one after another
 _HELD_AGAINST = 4000  # of the cheapest candidates, to find some that hold the task
 _SLOWEST = 0.05  # of the greatest pace: at rest no force would move anything
 
@@ -311,7 +311,7 @@ def robust_placement(
     settings: PlacementSettings | None = None,
 ) -> Placement:
     """The best placement for robots that correct errors as they push: with a margin of up
-    to 0.2 as far as there is one, all of them pushing, and none with more than ``most_force`` [N].
+    to 0.1 as far as there is one, all of them pushing, and none with more than ``most_force`` [N].
 
     Raises
     ------

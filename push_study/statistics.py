@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import fisher_exact, pearsonr, ranksums
+from scipy.stats import binomtest, fisher_exact, pearsonr, ranksums
 
 from push_model.arrays import Array, Mask
 
@@ -72,3 +72,8 @@ def cross_validated(features: Array, target: Array, seed: int = 1) -> Correlatio
         scaled = (features[fold] - mean) / spread
         predicted[fold] = np.column_stack([np.ones(len(fold)), scaled]) @ weights
     return correlation(predicted, target)
+
+
+def sign_test(lower: int, count: int) -> float:
+    """Two-sided p-value of one thing being lower than another in so many of ``count`` pairs."""
+    return float(binomtest(lower, count).pvalue) if count else 1.0

@@ -57,18 +57,19 @@ class Uncertainty:
         drawn: Row = {} if low == high else {"latency_s": latency}
         objects = {}
         for name, (item, start) in believed.objects.items():
-            objects[name] = (self._item(name, item, random, drawn), start)
+            objects[name] = (self.draw_item(name, item, random, drawn), start)
         robots = {}
         for name, (robot, start) in believed.robots.items():
-            robots[name] = (self._robot(name, robot, random, drawn), start)
+            robots[name] = (self.draw_robot(name, robot, random, drawn), start)
         return believed, replace(believed, objects=objects, robots=robots), drawn
 
     def _factor(self, random: np.random.Generator) -> float:
         return float(random.uniform(1.0 - self.spread, 1.0 + self.spread))
 
-    def _item(
+    def draw_item(
         self, name: str, item: ObjectSpec, random: np.random.Generator, drawn: Row
     ) -> ObjectSpec:
+        """What an object is in this trial; what is drawn is noted by name."""
         floor = item.floor_friction * self._factor(random)
         contact = item.contact_friction * self._factor(random)
         if self.contact_friction is not None:
@@ -83,9 +84,10 @@ class Uncertainty:
             drawn[f"{name}_com_x_m"], drawn[f"{name}_com_y_m"] = float(x), float(y)
         return changed
 
-    def _robot(
+    def draw_robot(
         self, name: str, robot: RobotSpec, random: np.random.Generator, drawn: Row
     ) -> RobotSpec:
+        """What a robot is in this trial; what is drawn is noted by name."""
         grip, drive = self._factor(random), robot.drive
         if isinstance(drive, HolonomicDrive):
             raise SettingsError(f"{name} has no wheels")

@@ -132,7 +132,7 @@ def test_a_robust_placement_has_margin_pushes_only_and_asks_no_robot_for_too_muc
     item, task = load_object("plate_ellipse"), SIX["polynomial-3"]
     cheapest = Placer(item, task, 3, 0.05, FEW).best()
     robust = robust_placement(item, task, 3, 0.05, 1.4, FEW)
-    assert cheapest.margin < 0.05 and robust.margin >= 0.2 and robust.cost >= cheapest.cost
+    assert cheapest.margin < 0.05 and robust.margin >= 0.1 and robust.cost >= cheapest.cost
     assert np.linalg.norm(robust.forces, axis=2).max() <= 1.4 * 1.001
     contacts = robust.contacts
     for vx, vy, omega in task.body_twists[1:-1]:

@@ -8,6 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from grasp_opt.group_control import GroupControlSettings
+from grasp_opt.group_push import GroupPushSettings
 from grasp_opt.placement import PlacementSettings
 from push_estimation.pose_gate import PoseGateSettings
 from push_model.settings import SettingsError, bounded, from_mapping, settings
@@ -34,6 +36,8 @@ ALL = (
     TorqueTrackerSettings,
     PlanarSettings,
     PlacementSettings,
+    GroupControlSettings,
+    GroupPushSettings,
 )
 
 

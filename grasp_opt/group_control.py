@@ -1,0 +1,222 @@
+"""Control of a group that pushes an object along a trajectory, section 3.2.2. No ROS, no clock.
+
+(3.20) says which wrench the object needs, (3.22)-(3.24) which forces within the friction cones come
+nearest to it, (3.25) how robots whose velocities are commanded make them. As printed, a robot moves
+along its force. Here robots follow the twist of the object that the forces can make, by its limit
+surface, as if they were fixed to it, and those that are to carry more than their share go ahead a
+little (docs/errata.md).
+
+The contacts are where the robots are now, not where they were placed: a robot with a ring that
+turns rolls along the object, by the ring's radius times the turn. Robots that are held against that
+drag the object aside, so they are only led back slowly.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.optimize import nnls
+
+from grasp_opt.contact_outline import ContactOutline, Contacts
+from push_model import se2
+from push_model.arrays import Array, Mask
+from push_model.coulomb import cone_edges
+from push_model.grasp import grasp_matrix
+from push_model.kinematics import DifferentialDrive
+from push_model.limit_surface import EllipsoidLimitSurface
+from push_model.settings import bounded, settings
+
+_SQUARES = 1e-3  # weight of forces beside the wrench that they lack
+
+
+@settings
+class GroupControlSettings:
+    """Gains of (3.20) and (3.25)."""
+
+    law: Literal["twist", "printed"] = bounded(
+        "twist", doc="robots follow the object's feasible twist, or their forces as in (3.25)"
+    )
+    position_gain: float = bounded(40.0, low=0.0, high=1e4, doc="[N/m] K_P of (3.20)")
+    orientation_gain: float = bounded(6.0, low=0.0, high=1e4, doc="[Nm/rad] K_P of (3.20)")
+    velocity_gain: float = bounded(2.0, low=0.0, high=1e4, doc="[Ns/m] K_D of (3.20)")
+    turning_gain: float = bounded(0.1, low=0.0, high=1e4, doc="[Nms/rad] K_D of (3.20)")
+    place_gain: float = bounded(
+        0.05, low=0.0, high=100.0, doc="[1/s] K_PR of (3.25), along the outline"
+    )
+    gap_gain: float = bounded(2.0, low=0.0, high=100.0, doc="[1/s] K_PR towards the object")
+    lost: float = bounded(
+        5e-3, low=1e-4, high=1.0, doc="[m] from the object at which a robot carries nothing"
+    )
+    approach: float = bounded(
+        0.02, low=0.0, high=1.0, doc="[m/s] at most towards the object, besides its own speed"
+    )
+    force_gain: float = bounded(0.002, low=0.0, high=10.0, doc="[m/s/N] K_VR of (3.25)")
+    correction: float = bounded(
+        2.0, low=1.0, high=10.0, doc="times the task's own speed that corrections may ask for"
+    )
+    lead: float = bounded(0.025, low=1e-3, high=1.0, doc="[m] of the controlled point ahead")
+
+
+@dataclass(frozen=True)
+class GroupCommand:
+    """What one tick asks for.
+
+    wrench ``(3,)`` in the object's frame; forces ``(n, 2)`` [N] likewise; lacking: part of the
+    wrench that they do not make; gaps ``(n,)`` [m] between robots and object; velocities ``(n, 2)``
+    [m/s] of robots in the world's frame.
+    """
+
+    wrench: Array
+    forces: Array
+    lacking: float
+    gaps: Array
+    velocities: Array
+
+
+def distribute(wrench: Array, contacts: Contacts, friction: float, length: float) -> Array:
+    """(3.22)-(3.24): forces ``(n, 2)`` [N] within the cones that come nearest to a wrench ``(3,)``.
+
+    Torques count as forces at ``length`` [m]; of equal ones the least.
+    """
+    n = len(contacts.points)
+    scale = np.array([1.0, 1.0, length])
+    G = grasp_matrix(contacts.points) / scale[:, None]
+    spread = np.zeros((2 * n, 2 * n))
+    for i, normal in enumerate(contacts.normals):
+        spread[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = cone_edges(normal, friction).T
+    A = np.vstack([G @ spread, _SQUARES * spread])
+    answer, _ = nnls(A, np.concatenate([wrench / scale, np.zeros(2 * n)]))
+    forces: Array = (spread @ answer).reshape(n, 2)
+    return forces
+
+
+class GroupController:
+    """One group on one object, placed at ``ways (n,)`` [m] along its outline."""
+
+    def __init__(
+        self,
+        outline: ContactOutline,
+        ways: Array,
+        friction: float,
+        surface: EllipsoidLimitSurface,
+        radius: float,
+        settings: GroupControlSettings | None = None,
+    ) -> None:
+        """radius: [m] of the robots' rings. friction: of the contacts, as believed."""
+        self.settings = settings or GroupControlSettings()
+        self.outline, self.friction, self.surface = outline, friction, surface
+        self._radius = radius
+        self.places = outline.at(ways).centres(radius)
+
+    def meet(self, pose: Array, ahead: Array, robots: Array) -> tuple[Array, Array]:
+        """Velocities ``(n, 2)`` [m/s] by which robots come to an object at a pose ``(3,)`` along
+        unit directions ``ahead (n, 2)`` in its frame, and their gaps ``(n,)`` [m].
+
+        A robot that already goes the way that it will push does not have to turn at the object.
+        """
+        s = self.settings
+        local = se2.transform(se2.inverse(pose), robots)
+        way, away = self.outline.nearest(local)
+        gaps = away - self._radius
+        slant = np.maximum(0.3, (self.outline.at(way).normals * ahead).sum(axis=1))
+        speed = np.clip(s.gap_gain * gaps / slant, -s.approach, s.approach)
+        return (speed[:, None] * ahead) @ se2.rotation_matrix(float(pose[2])).T, gaps
+
+    def ahead(self, twist: Array) -> Array:
+        """``(n, 2)`` unit directions of the robots at their places as the object begins to move
+        with a twist ``(3,)``, in its frame."""
+        directions = rigid(twist, self.places)
+        unit: Array = directions / np.hypot(*directions.T)[:, None]
+        return unit
+
+    def command(
+        self, pose: Array, twist: Array, wanted: Array, wanted_twist: Array, robots: Array
+    ) -> GroupCommand:
+        """One tick.
+
+        Parameters
+        ----------
+        pose, twist ``(3,)``: of the object's centre of mass, as estimated; wanted likewise, of now;
+            all along the world's axes. robots: ``(n, 2)`` [m] their centres.
+        """
+        s, c = self.settings, self.surface.radius
+        off = wanted - pose
+        off[2] = math.remainder(off[2], 2.0 * math.pi)
+        off, change, task = (
+            _into(float(pose[2]), v) for v in (off, wanted_twist - twist, wanted_twist)
+        )
+        wrench = (
+            np.array([s.position_gain, s.position_gain, s.orientation_gain]) * off
+            + np.array([s.velocity_gain, s.velocity_gain, s.turning_gain]) * change
+            + self.surface.wrench(task)  # (3.21), zero at rest, where it is 0/0
+        )
+        local = se2.transform(se2.inverse(pose), robots)
+        way, away = self.outline.nearest(local)
+        contacts, gaps = self.outline.at(way), away - self._radius
+        touching = gaps < s.lost
+        forces = np.zeros((len(robots), 2))
+        if touching.any():
+            here = Contacts(contacts.points[touching], contacts.normals[touching])
+            forces[touching] = distribute(wrench, here, self.friction, c)
+        made = grasp_matrix(contacts.points) @ forces.ravel()
+        scale = np.array([1.0, 1.0, c])
+        size = float(np.linalg.norm(wrench / scale))
+        lacking = float(np.linalg.norm((wrench - made) / scale)) / size if size > 0.0 else 0.0
+        off_place = s.place_gain * (self.places - local)
+        if s.law == "printed":
+            moved = off_place + s.force_gain * forces
+        else:
+            normals = contacts.normals
+            moved = rigid(self._feasible(made, task), local)
+            moved += off_place - (off_place * normals).sum(axis=1)[:, None] * normals
+            moved += self._inward(gaps, forces, normals, touching)[:, None] * normals
+        world = se2.rotation_matrix(float(pose[2]))
+        return GroupCommand(wrench, forces, lacking, gaps, moved @ world.T)
+
+    def _inward(self, gaps: Array, forces: Array, normals: Array, touching: Mask) -> Array:
+        """``(n,)`` [m/s] towards the object: what is away comes, who is to carry more goes ahead.
+
+        Of those in contact only what differs between them counts: all together ahead would push
+        the object ahead.
+        """
+        s = self.settings
+        inward: Array = np.clip(s.gap_gain * gaps, -s.approach, s.approach)
+        if touching.any():
+            inward[touching] += s.force_gain * (forces * normals).sum(axis=1)[touching]
+            inward[touching] -= inward[touching].mean()
+        return inward
+
+    def _feasible(self, wrench: Array, task: Array) -> Array:
+        """The twist ``(3,)`` that a wrench makes by the limit surface, as fast as the wrench is of
+        the floor's greatest friction times the task's speed."""
+        scale = np.array([1.0, 1.0, self.surface.radius])
+        scaled = wrench / scale
+        size, speed = float(np.linalg.norm(scaled)), float(np.linalg.norm(task * scale))
+        if size == 0.0 or speed == 0.0:
+            return np.zeros(3)
+        pace = min(self.settings.correction, size / self.surface.max_force) * speed
+        twist: Array = pace * scaled / size / scale
+        return twist
+
+
+def rigid(twist: Array, points: Array) -> Array:
+    """Velocities ``(n, 2)`` [m/s] of points ``(n, 2)`` [m] of a body that moves with a twist, all
+    in its frame."""
+    return np.column_stack([twist[0] - twist[2] * points[:, 1], twist[1] + twist[2] * points[:, 0]])
+
+
+def wheels_command(
+    velocity: Array, heading: float, drive: DifferentialDrive, lead: float
+) -> tuple[float, float]:
+    """Input/output linearisation: v [m/s], omega [rad/s] by which a point ``lead`` [m] ahead of the
+    axle moves at a velocity ``(2,)`` (world), as far as the wheels can; in the same direction."""
+    c, s = math.cos(heading), math.sin(heading)
+    v, omega = c * velocity[0] + s * velocity[1], (-s * velocity[0] + c * velocity[1]) / lead
+    return drive.saturate(float(v), float(omega))
+
+
+def _into(heading: float, twist: Array) -> Array:
+    """A twist ``(3,)`` along the world's axes in a frame with that heading."""
+    c, s = math.cos(heading), math.sin(heading)
+    return np.array([c * twist[0] + s * twist[1], -s * twist[0] + c * twist[1], twist[2]])

@@ -1,0 +1,223 @@
+"""One push by a group that stands at its places: find contact, follow the trajectory, end. No ROS.
+
+Whatever goes wrong ends the push with a reason: an object that falls behind or aside, robots that
+find no contact, a robot that does not move although it is told to.
+"""
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from grasp_opt.contact_outline import ContactOutline
+from grasp_opt.group_control import (
+    GroupCommand,
+    GroupController,
+    GroupControlSettings,
+    wheels_command,
+)
+from grasp_opt.object_trajectory import ObjectTrajectory
+from push_estimation.velocity_filter import VelocityFilter
+from push_model import se2
+from push_model.arrays import Array
+from push_model.settings import bounded, settings
+from push_model.specs import ObjectSpec, RobotSpec
+
+
+@settings
+class GroupPushSettings:
+    """What is taken for contact, for progress and for failure."""
+
+    contact: float = bounded(1e-3, low=1e-5, high=0.1, doc="[m] of a gap that counts as contact")
+    steady: float = bounded(0.1, low=0.0, high=10.0, doc="[s] that all must be in contact")
+    search: float = bounded(8.0, low=0.1, high=600.0, doc="[s] at most until all have contact")
+    behind: float = bounded(
+        0.01, low=1e-4, high=1.0, doc="[m] of error from which the trajectory waits, up to twice it"
+    )
+    position_error: float = bounded(0.05, low=1e-3, high=10.0, doc="[m] at which the push fails")
+    orientation_error: float = bounded(0.3, low=0.01, high=7.0, doc="[rad] likewise")
+    stalled: float = bounded(4.0, low=0.1, high=600.0, doc="[s] without progress, likewise")
+    dead: float = bounded(1.0, low=0.1, high=60.0, doc="[s] that a robot may not do as told")
+    dead_way: float = bounded(0.01, low=1e-4, high=1.0, doc="[m] that it should have gone then")
+    position_noise: float = bounded(2e-4, low=1e-6, high=0.1, doc="[m] of poses, for the filter")
+    orientation_noise: float = bounded(1.7e-3, low=1e-6, high=0.5, doc="[rad] likewise")
+    acceleration: float = bounded(0.3, low=1e-3, high=100.0, doc="[m/s^2] of the object, likewise")
+    turning: float = bounded(1.5, low=1e-3, high=1000.0, doc="[rad/s^2] likewise")
+
+
+class Phase(Enum):
+    """Of a push."""
+
+    SEARCH = "search"
+    PUSH = "push"
+    DONE = "done"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True)
+class GroupStep:
+    """Commands of one tick: twists ``(n, 2)`` v [m/s], omega [rad/s]; command: what they come from;
+    time: [s] along the trajectory; reason and dead (indices of robots) of a failure."""
+
+    phase: Phase
+    twists: Array
+    command: GroupCommand | None
+    time: float
+    reason: str = ""
+    dead: tuple[int, ...] = ()
+
+
+class Obedience:
+    """Tells which robots do not go although they are told to."""
+
+    def __init__(self, count: int, patience: float, way: float) -> None:
+        """patience: [s] over which ``way`` [m] must be commanded, a tenth of which must be gone."""
+        self._patience, self._way = patience, way
+        self._seen: deque[tuple[float, Array, Array, Array]] = deque()
+        self._told = np.zeros(count)  # [m] so far
+
+    def step(self, time: float, robots: Array, speeds: Array) -> tuple[int, ...]:
+        """Indices of the disobedient; robots ``(n, 3)`` poses, speeds ``(n,)`` [m/s] that they are
+        told from now on."""
+        if self._seen:
+            before, _, told, _ = self._seen[-1]
+            self._told = self._told + told * (time - before)
+        self._seen.append((time, np.array(robots[:, :2]), np.abs(speeds), self._told))
+        while time - self._seen[0][0] > self._patience:
+            self._seen.popleft()
+        first, places, _, sums = self._seen[0]
+        if time - first < 0.9 * self._patience:
+            return ()
+        told = self._told - sums
+        gone = np.hypot(*(robots[:, :2] - places).T)
+        return tuple(int(i) for i in np.flatnonzero((told > self._way) & (gone < 0.1 * told)))
+
+
+class GroupPush:
+    """Robots of one type that stand at ``ways (n,)`` [m] along an outline, a little off it."""
+
+    def __init__(
+        self,
+        item: ObjectSpec,
+        robot: RobotSpec,
+        ways: Array,
+        trajectory: ObjectTrajectory,
+        settings: GroupPushSettings | None = None,
+        control: GroupControlSettings | None = None,
+    ) -> None:
+        """item, robot: as believed. trajectory: of the object's centre of mass.
+
+        ahead: ``(n, 2)`` directions in the object's frame in which the robots come to it.
+        """
+        self.settings = s = settings or GroupPushSettings()
+        self.trajectory, self._drive = trajectory, robot.differential
+        self.controller = GroupController(
+            ContactOutline(item.geometry),
+            ways,
+            item.contact_friction,
+            item.limit_surface(),
+            robot.footprint_radius,
+            control,
+        )
+        moving = int(np.argmax(np.linalg.norm(trajectory.body_twists, axis=1) > 0.0))
+        self.ahead = self.controller.ahead(trajectory.body_twists[moving])
+        self._filter = VelocityFilter(
+            s.position_noise, s.orientation_noise, s.acceleration, s.turning
+        )
+        self._obedience = Obedience(len(ways), s.dead, s.dead_way)
+        self._begin: float | None = None
+        self._last = 0.0
+        self._contact_since: float | None = None
+        self.time = 0.0  # [s] along the trajectory
+        self._moved_on = 0.0  # [s] when it last did
+
+    def starts(self, pose: Array, off: float) -> Array:
+        """``(n, 3)`` poses from which robots come to the object at a pose ``(3,)``, so far [m] from
+        where they touch it."""
+        centres = se2.transform(pose, self.controller.places - off * self.ahead)
+        headings = pose[2] + np.arctan2(self.ahead[:, 1], self.ahead[:, 0])
+        return np.column_stack([centres, headings])
+
+    def step(self, now: float, pose: Array, robots: Array) -> GroupStep:
+        """One tick. pose ``(3,)`` of the object's centre of mass, robots ``(n, 3)``, at a time."""
+        s = self.settings
+        if self._begin is None:
+            self._begin = self._last = self._moved_on = now
+        tick, self._last = now - self._last, now
+        self._filter.update(now, pose)
+        estimate = self._filter.pose
+        searching = self._contact_since is None or now - self._contact_since < s.steady
+        if not searching:
+            self._go_on(now, tick, estimate)
+        ahead = self.time + tick
+        command = None
+        if searching:
+            velocities, gaps = self.controller.meet(estimate, self.ahead, robots[:, :2])
+            self._look_for_contact(now, gaps)
+        else:
+            command = self.controller.command(
+                estimate,
+                self._filter.twist,
+                self.trajectory.sample(ahead),
+                self.trajectory.twist_at(ahead),
+                robots[:, :2],
+            )
+            velocities = command.velocities
+        lead = self.controller.settings.lead
+        twists = np.array(
+            [
+                wheels_command(velocity, float(robot[2]), self._drive, lead)
+                for velocity, robot in zip(velocities, robots, strict=True)
+            ]
+        )
+        failure, dead = self._failure(now, estimate, robots, twists, searching)
+        if failure:
+            return GroupStep(Phase.FAILED, 0.0 * twists, command, self.time, failure, dead)
+        if not searching and self.time >= self.trajectory.duration:
+            return GroupStep(Phase.DONE, 0.0 * twists, command, self.time)
+        return GroupStep(Phase.SEARCH if searching else Phase.PUSH, twists, command, self.time)
+
+    def _look_for_contact(self, now: float, gaps: Array) -> None:
+        if (gaps > self.settings.contact).any():
+            self._contact_since = None
+        elif self._contact_since is None:
+            self._contact_since = now
+
+    def _go_on(self, now: float, tick: float, pose: Array) -> None:
+        """Move along the trajectory, slower the farther the object is behind."""
+        s = self.settings
+        away, _ = self._errors(pose)
+        pace = float(np.clip(2.0 - away / s.behind, 0.0, 1.0))
+        self.time += pace * tick
+        if pace > 0.1:
+            self._moved_on = now
+
+    def _errors(self, pose: Array) -> tuple[float, float]:
+        off = self.trajectory.sample(self.time) - pose
+        return math.hypot(off[0], off[1]), abs(math.remainder(off[2], 2.0 * math.pi))
+
+    def _failure(
+        self, now: float, pose: Array, robots: Array, twists: Array, searching: bool
+    ) -> tuple[str, tuple[int, ...]]:
+        """Why the push cannot go on, or nothing; and which robots are to blame."""
+        s = self.settings
+        assert self._begin is not None
+        dead = self._obedience.step(now, robots, twists[:, 0])
+        if dead and len(dead) < len(robots):
+            return f"{_count(dead)} not move although told to", dead
+        away, turned = self._errors(pose)
+        if away > s.position_error or turned > s.orientation_error:
+            return f"the object is {1e3 * away:.0f} mm and {turned:.2f} rad off its way", ()
+        if searching:
+            late = now - self._begin > s.search
+            return ("not every robot found contact" if late else ""), ()
+        if now - self._moved_on > s.stalled:
+            return f"the object stays {1e3 * away:.0f} mm behind", ()
+        return "", ()
+
+
+def _count(who: Sequence[int]) -> str:
+    return "a robot does" if len(who) == 1 else f"{len(who)} robots do"

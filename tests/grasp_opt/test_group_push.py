@@ -1,0 +1,86 @@
+"""A whole push of a group in the planar world, and what ends one early."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from grasp_opt.contact_outline import ContactOutline
+from grasp_opt.group_push import GroupPush, GroupPushSettings, Obedience, Phase
+from grasp_opt.object_trajectory import polynomial
+from push_model.specs import EnvironmentSpec
+from push_scenario.bodies import load_object, load_robot
+from push_study.group_world import TICK, GroupWorld
+from push_study.uncertainty import uncertainty
+
+ITEM, ROBOT = load_object("plate_ellipse"), load_robot("epuck_ring")
+ROOM = EnvironmentSpec((6.0, 6.0), resolution=0.05)
+BEND = polynomial((0.25,), 0.5, 0.05, 0.05, -0.5 * math.pi)
+WAYS = ContactOutline(ITEM.geometry).way_of_angle(1.5 * math.pi + np.array([-0.6, 0.0, 0.6]))
+
+
+def run(push, real=ITEM, off=0.01, moved=None, until=40.0, kill=None):
+    """The last step, the object's last pose, and the time; moved: robot that starts elsewhere."""
+    starts = push.starts(BEND.pose[0], off)
+    for index, way in (moved or {}).items():
+        starts[index, :2] += way
+    begin, doubt = real.geometric_pose(BEND.pose[0]), uncertainty("none")
+    with GroupWorld(ROOM, ROBOT, starts, real, begin, doubt, 1, "planar") as world:
+        while world.time < until:
+            seen, robots = world.see()
+            step = push.step(world.time, ITEM.mass_pose(seen), robots)
+            world.step(step.twists)
+            if kill is not None and world.time >= kill[0]:
+                world.kill([world.names[kill[1]]])
+            if step.phase in (Phase.DONE, Phase.FAILED):
+                assert not step.twists.any()
+                break
+        return step, ITEM.mass_pose(world.truth()[0]), world.time
+
+
+def test_a_push_ends_where_its_trajectory_does():
+    step, pose, time = run(GroupPush(ITEM, ROBOT, WAYS, BEND))
+    assert step.phase is Phase.DONE and step.reason == ""
+    assert np.hypot(*(pose - BEND.pose[-1])[:2]) < 3e-3
+    assert abs(pose[2] - BEND.pose[-1, 2]) < 0.01
+    assert BEND.duration < time < BEND.duration + 4.0
+
+
+@pytest.mark.parametrize("who", [0, 1, 2])
+def test_a_robot_that_dies_is_named_within_two_seconds(who):
+    step, _, time = run(GroupPush(ITEM, ROBOT, WAYS, BEND), kill=(4.0, who))
+    assert step.phase is Phase.FAILED and time < 4.0 + 2.0
+    assert step.dead == (who,) and "does not move although told to" in step.reason
+
+
+def test_contact_is_not_searched_for_ever():
+    settings = GroupPushSettings(search=3.0)
+    push = GroupPush(ITEM, ROBOT, WAYS, BEND, settings)
+    step, pose, time = run(push, moved={1: np.array([-0.5, 0.0])})
+    assert step.phase is Phase.FAILED and step.reason == "not every robot found contact"
+    assert time == pytest.approx(3.0, abs=0.1)
+    assert np.hypot(*(pose - BEND.pose[0])[:2]) < 2e-3, "those in contact wait for the others"
+
+
+def test_an_object_that_is_too_heavy_ends_the_push():
+    step, pose, time = run(GroupPush(ITEM, ROBOT, WAYS, BEND), real=replace(ITEM, mass=2.0))
+    assert step.phase is Phase.FAILED and time < 15.0
+    assert "behind" in step.reason or "off its way" in step.reason or "do" in step.reason
+    assert np.hypot(*(pose - BEND.pose[0])[:2]) < 0.02
+
+
+def test_obedience_tells_who_stands_from_who_waits_and_who_goes():
+    random = np.random.default_rng(1)
+    watch = Obedience(3, 1.0, 0.01)
+    told = np.array([0.05, 0.05, 0.0])
+    for k in range(120):
+        t = k * TICK
+        poses = np.zeros((3, 3))
+        poses[0, 0] = 0.05 * t
+        poses[:, :2] += random.normal(0.0, 2e-4, (3, 2))
+        assert watch.step(t, poses, told) in ((), (1,))
+        if t > 1.1:
+            assert watch.step(t, poses, told) == (1,)
+        if t < 0.8:
+            assert watch.step(t, poses, told) == ()
