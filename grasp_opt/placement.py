@@ -8,6 +8,7 @@ ones are refined. ``benchmarks/placement.py`` holds the answer against far finer
 
 import itertools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -20,7 +21,7 @@ from grasp_opt.object_trajectory import ObjectTrajectory
 from grasp_opt.selection import apart
 from grasp_opt.tracking_cost import cone_columns, contact_at, tracking_cost
 from grasp_opt.wrench_cone import HELD, margin, task_wrenches, wrench_rays
-from push_model.arrays import Array
+from push_model.arrays import Array, Mask
 from push_model.settings import bounded, settings
 from push_model.specs import ObjectSpec
 
@@ -100,12 +101,16 @@ class Placer:
         count: int,
         radius: float,
         settings: PlacementSettings | None = None,
+        free: Callable[[Array], Mask] | None = None,
     ) -> None:
-        """Raises ValueError for a number of robots that is not 1 to 5."""
+        """free: tells of ways ``(n,)`` along the outline where a robot has room.
+
+        Raises ValueError for a number of robots that is not 1 to 5."""
         if count not in _GRID:
             raise ValueError(f"1 to 5 robots can be placed, not {count}")
         self.settings = settings or PlacementSettings()
         self.item, self.count, self.radius = item, count, radius
+        self._free = free or (lambda way: np.ones(len(way), dtype=np.bool_))
         self.outline = ContactOutline(item.geometry)
         s, surface = self.settings, item.limit_surface()
         self._surface = surface
@@ -149,9 +154,9 @@ class Placer:
         )  # fmt: skip
 
     def allowed(self, way: Array) -> bool:
-        """Whether robots at these places keep apart and off the corners."""
+        """Whether robots have room at these places, keep apart and off the corners."""
         s, contacts = self.settings, self.outline.at(way)
-        if self.outline.from_corner(way).min() < s.corner:
+        if self.outline.from_corner(way).min() < s.corner or not self._free(way).all():
             return False
         return apart(contacts, self.radius, s.gap)
 
@@ -190,7 +195,7 @@ class Placer:
         """
         count = count or self.count
         at = (np.arange(points) + 0.5) / points * self.outline.length
-        at = at[self.outline.from_corner(at) >= self.settings.corner]
+        at = at[(self.outline.from_corner(at) >= self.settings.corner) & self._free(at)]
         centres = self.outline.at(at).centres(self.radius)
         away = np.hypot(*(centres[:, None] - centres[None]).transpose(2, 0, 1))
         free = away >= 2.0 * self.radius + self.settings.gap
@@ -309,6 +314,7 @@ def robust_placement(
     radius: float,
     most_force: float,
     settings: PlacementSettings | None = None,
+    free: Callable[[Array], Mask] | None = None,
 ) -> Placement:
     """The best placement for robots that correct errors as they push: with a margin of up
     to 0.1 as far as there is one, all of them pushing, and none with more than ``most_force`` [N].
@@ -321,7 +327,7 @@ def robust_placement(
     for least in _MARGINS:
         asked = replace(settings, least_margin=least, only_pushing=True, most_force=most_force)
         try:
-            return Placer(item, trajectory, count, radius, asked).best()
+            return Placer(item, trajectory, count, radius, asked, free).best()
         except NoPlacement:
             if least == _MARGINS[-1]:
                 raise

@@ -24,6 +24,17 @@ class JobError(IntEnum):
     TOO_HEAVY = 315
 
 
+class JobPhase(IntEnum):
+    """The states of JobState: those of the state machine of section 2.5."""
+
+    IDLE = 1
+    PLANNING = 2
+    POSITIONING = 3
+    APPROACH = 4
+    PUSHING = 5
+    DETACHING = 6
+
+
 class GoalRefused(Exception):
     """A goal that cannot be taken; carries the code."""
 

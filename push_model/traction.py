@@ -63,6 +63,15 @@ def traction(robot: RobotSpec, force: float, lift: float = 0.0) -> float:
     return min(carried, 2.0 * torque / drive.wheel_radius)
 
 
+def standing_traction(robot: RobotSpec, lift: float = 0.0) -> float:
+    """[N] with which a robot can push at most, leaning back as far as that makes it."""
+    low, high = 0.0, max(traction(robot, 0.0, lift), 1e-9)
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if traction(robot, middle, lift) >= middle else (low, middle)
+    return low
+
+
 def too_heavy(robot: RobotSpec, item: ObjectSpec) -> str | None:
     """Why a robot cannot push an object alone, or None when it can.
 

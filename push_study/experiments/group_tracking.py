@@ -25,7 +25,7 @@ from push_model import se2
 from push_model.arrays import Array
 from push_model.settings import SettingsError
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
-from push_model.traction import lift_share, traction
+from push_model.traction import lift_share, standing_traction
 from push_scenario.bodies import load_object, load_robot
 from push_study.group_world import GroupWorld
 from push_study.pool import Row
@@ -97,19 +97,11 @@ def tasks(options: StudyOptions) -> list[TrackingTask]:
     ]
 
 
-def least_traction(robot: RobotSpec, item: ObjectSpec) -> float:
-    """[N] that a robot can push an object with while it leans back as far as that makes it."""
-    lift, force = lift_share(robot, item), 0.0
-    for _ in range(50):
-        force = 0.5 * (force + traction(robot, force, lift))
-    return force
-
-
 def placement_of(task: TrackingTask, item: ObjectSpec, robot: RobotSpec) -> Placement:
     """Where the robots of a task push."""
     path, radius = trajectories()[task.scenario], robot.footprint_radius
     if task.placement == "optimised":
-        most = 0.9 * least_traction(robot, item)
+        most = 0.9 * standing_traction(robot, lift_share(robot, item))
         return robust_placement(item, path, task.robots, radius, most)
     placer = Placer(item, path, task.robots, radius)
     return placer.placement(placer.outline.way_of_angle(np.array(THETA0[task.robots])))

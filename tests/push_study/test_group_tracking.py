@@ -7,7 +7,7 @@ import pytest
 
 from grasp_opt.contact_outline import ContactOutline
 from push_model.settings import SettingsError
-from push_model.traction import traction
+from push_model.traction import lift_share, standing_traction, traction
 from push_scenario.bodies import load_object, load_robot
 from push_study.experiments import group_tracking
 from push_study.experiments.group_tracking import THETA0, TrackingTask
@@ -46,8 +46,9 @@ def test_placements_are_what_they_are_called():
     assert np.sort(angles) == pytest.approx(np.sort(THETA0[3]), abs=1e-6)
     best = group_tracking.placement_of(task("x", robots=3), item, robot)
     assert best.cost < even.cost and best.margin >= 0.1 - 1e-6
-    most = group_tracking.least_traction(robot, item)
-    assert most == pytest.approx(traction(robot, most, 0.0), rel=0.1)
+    lift = lift_share(robot, item)
+    most = standing_traction(robot, lift)
+    assert most == pytest.approx(traction(robot, most, lift), rel=1e-6)
     assert np.linalg.norm(best.forces, axis=2).max() <= 0.9 * most + 1e-9
 
 

@@ -1,0 +1,248 @@
+"""Random goals for groups: any plate, two to five e-pucks, with and without obstacles.
+
+The whole job of ``grasp_opt``: the object's way, how many push, where, how they get there, the
+pushes, and what is done when something goes wrong.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_opt.free_space import FreeSpace, Obstacles
+from grasp_opt.group_job import GroupJob
+from grasp_opt.object_way import NoObjectWay, WayFinder
+from grasp_opt.step_planner import NoStep, StepPlanner, StepSettings, TooFew
+from push_model import se2
+from push_model.arrays import Array
+from push_model.jobs import JobError, JobPhase
+from push_model.occupancy import OccupancyGrid, rasterise
+from push_model.settings import SettingsError, from_mapping
+from push_model.specs import EnvironmentSpec, ObjectSpec
+from push_scenario.bodies import load_object, load_robot
+from push_study.group_world import GroupWorld
+from push_study.pool import Row
+from push_study.study import StudyOptions
+from push_study.uncertainty import uncertainty
+
+SCENARIOS = ("open", "obstacles", "dead")
+"""Nothing in the way; obstacles; obstacles, and one of four robots dies in its first push."""
+CHOOSES_WORLD = True
+ROBOT = "epuck_ring"
+SIZE = (4.0, 3.0)  # [m]
+_GOAL = 0.02, 0.1  # [m], [rad] that count as success
+_RADIUS = 0.2  # [m] of the circle about a plate
+_LIMIT = 1200.0  # [s] of simulation
+_DRAWS = 2000
+_GRID = 0.02  # [m]
+
+
+@dataclass(frozen=True)
+class GoalTask:
+    """One goal. scenario: one of SCENARIOS; robots: how many there are; sides: of the plate, 0 for
+    the ellipse."""
+
+    scenario: str
+    seed: int
+    out: str
+    robots: int
+    sides: int
+    world: str
+    uncertainty: str
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A room with an object and robots in it, and a goal; poses ``(3,)`` of the centre of mass,
+    robots ``(n, 3)``."""
+
+    environment: EnvironmentSpec
+    item: ObjectSpec
+    start: Array
+    goal: Array
+    robots: Array
+
+
+def tasks(options: StudyOptions) -> list[GoalTask]:
+    """As many trials of each; shapes and numbers of robots take turns."""
+    unknown = [name for name in options.scenarios if name not in SCENARIOS]
+    if unknown:
+        known = ", ".join(SCENARIOS)
+        raise SettingsError(f"no worlds called '{unknown[0]}'; expected one of: {known}")
+    shapes = (0, *range(3, 9))
+    return [
+        GoalTask(
+            name,
+            seed,
+            str(options.out),
+            4 if name == "dead" else 2 + seed % 4,
+            shapes[seed % len(shapes)],
+            options.world or "pybullet",
+            options.uncertainty,
+        )
+        for name in options.scenarios
+        for seed in range(options.seed, options.seed + options.trials)
+    ]
+
+
+def plate(sides: int) -> ObjectSpec:
+    """A regular plate of the weight and friction of chapter 3's; 0 sides: its ellipse."""
+    ellipse = load_object("plate_ellipse")
+    if not sides:
+        return ellipse
+    angles = 2.0 * math.pi * (np.arange(sides) + 0.5) / sides
+    corners = _RADIUS * np.column_stack([np.cos(angles), np.sin(angles)])
+    values = {
+        "shape": {"polygon": {"vertices": corners.tolist()}},
+        "mass": ellipse.mass,
+        "height": ellipse.height,
+        "floor_friction": ellipse.floor_friction,
+        "contact_friction": ellipse.contact_friction,
+    }
+    return from_mapping(ObjectSpec, values, f"plate of {sides} sides")
+
+
+def problem(task: GoalTask) -> Problem:
+    """The random problem of a task, the same in every world.
+
+    Start and goal have room for robots all round, and there is a way between them that has.
+    """
+    random = np.random.default_rng([task.seed, SCENARIOS.index(task.scenario)])
+    item, robot = plate(task.sides), load_robot(ROBOT)
+    radius, outline = robot.footprint_radius, item.geometry.outline
+    room = 2.0 * radius + StepSettings().room
+    for _ in range(_DRAWS):
+        environment = _environment(random, task.scenario != "open")
+        space = FreeSpace(rasterise(environment))
+        finder = WayFinder(space, outline, room)
+        half = 0.5 * np.array(SIZE)
+        start, goal = (
+            np.append(random.uniform(-half, half), random.uniform(-math.pi, math.pi))
+            for _ in range(2)
+        )
+        if np.hypot(*(goal - start)[:2]) < 0.3:
+            continue
+        if finder.clearance(np.array([start, goal]), Obstacles()).min() < room + 0.01:
+            continue
+        try:
+            finder.way(start, goal, Obstacles())
+        except NoObjectWay:
+            continue
+        robots = _robots(random, task.robots, space, se2.transform(start, outline), radius)
+        return Problem(environment, item, start, goal, robots)
+    raise RuntimeError("no problem could be drawn")
+
+
+def _environment(random: np.random.Generator, obstacles: bool) -> EnvironmentSpec:
+    circles = []
+    for _ in range(int(random.integers(3, 6)) if obstacles else 0):
+        centre = random.uniform(-0.5, 0.5, 2) * (np.array(SIZE) - 0.4)
+        circles.append({"centre": centre.tolist(), "radius": float(random.uniform(0.08, 0.2))})
+    values = {"size": list(SIZE), "resolution": _GRID, "circles": circles}
+    return from_mapping(EnvironmentSpec, values, "environment")
+
+
+def _robots(
+    random: np.random.Generator, count: int, space: FreeSpace, outline: Array, radius: float
+) -> Array:
+    """Anywhere in the room, not nearer than 3 cm to anything."""
+    placed: list[Array] = []
+    while len(placed) < count:
+        pose = np.append(random.uniform(-0.5, 0.5, 2) * SIZE, random.uniform(-math.pi, math.pi))
+        discs = np.array([[p[0], p[1], radius] for p in placed]).reshape(-1, 3)
+        if space.room(pose[None, :2], Obstacles((outline,), discs))[0] > radius + 0.03:
+            placed.append(pose)
+    return np.array(placed)
+
+
+def trial(task: GoalTask) -> Row:
+    """One job."""
+    p, robot, doubt = problem(task), load_robot(ROBOT), uncertainty(task.uncertainty)
+    grid: OccupancyGrid = rasterise(p.environment)
+    planner = StepPlanner(grid, p.item, robot)
+    job = GroupJob(p.item, robot, task.robots)
+    job.begin(p.goal)
+    begin, collisions, killed = p.item.geometric_pose(p.start), 0, ""
+    with GroupWorld(
+        p.environment, robot, p.robots, p.item, begin, doubt, task.seed, task.world
+    ) as world:
+        while world.time < _LIMIT and job.busy:
+            seen, robots = world.see()
+            twists = job.step(world.time, p.item.mass_pose(seen), robots)
+            answer(job, planner)
+            if task.scenario == "dead" and not killed and _in_the_middle(job):
+                assert job.plan is not None
+                killed = world.names[job.plan.pushers[task.seed % len(job.plan.pushers)]]
+                world.kill([killed])
+            world.step(twists)
+            collisions += world.felt()[1]
+        off = se2.between(p.goal, world.item.mass_pose(world.truth()[0]))
+        taken, drawn = world.time, world.drawn
+    away, turned = float(np.hypot(off[0], off[1])), abs(float(off[2]))
+    ended = not job.busy and job.error is JobError.NONE
+    return {
+        "scenario": task.scenario,
+        "seed": task.seed,
+        "robots": task.robots,
+        "sides": task.sides,
+        "success": bool(ended and away <= _GOAL[0] and turned <= _GOAL[1]),
+        "reason": job.reason if job.busy or job.error is not JobError.NONE else "",
+        "killed": killed,
+        "position_error_m": away,
+        "orientation_error_rad": turned,
+        "duration_s": taken,
+        "distance_m": float(np.hypot(*(p.goal - p.start)[:2])),
+        "pushes": job.pushes,
+        "replans": job.replans,
+        "collision_ticks": collisions,
+    } | drawn
+
+
+def answer(job: GroupJob, planner: StepPlanner) -> None:
+    """Plan what a job asks for; the world stands still meanwhile."""
+    request = job.request
+    if request is None:
+        return
+    others = np.zeros((0, 3))
+    try:
+        job.planned(planner.plan(request.pose, request.goal, request.robots, request.dead, others))
+    except TooFew as error:
+        job.failed(JobError.TOO_HEAVY, str(error))
+    except NoStep as error:
+        job.failed(JobError.PLANNING_FAILED, str(error))
+
+
+def _in_the_middle(job: GroupJob) -> bool:
+    """Of a push that is long enough for it."""
+    if job.state is not JobPhase.PUSHING or job.plan is None or job.last is None:
+        return False
+    return job.last.time > 0.5 * job.plan.trajectory.duration
+
+
+def conclude(options: StudyOptions, tasks: Sequence[GoalTask], rows: list[Row]) -> None:
+    """By worlds, numbers of robots and shapes."""
+    print(
+        "\nworlds      robots   reached     position [mm]      orientation [rad]   time [s]  pushes"
+    )
+    for name in options.scenarios:
+        counts = sorted({t.robots for t in tasks if t.scenario == name})
+        for count in [*counts, 0] if len(counts) > 1 else counts:
+            mine = [
+                r for r in rows if r["scenario"] == name and (not count or r.get("robots") == count)
+            ]
+            good = [r for r in mine if r["success"]]
+            if not good:
+                print(f"{name:10s} {count or 'all'!s:>6s}   0 of {len(mine)}")
+                continue
+            away = 1e3 * np.array([r["position_error_m"] for r in good])
+            turned = np.array([r["orientation_error_rad"] for r in good])
+            print(
+                f"{name:10s} {count or 'all'!s:>6s}  {len(good):3d} of {len(mine):<3d}"
+                f"  {away.mean():6.2f} (<= {away.max():5.2f})  {turned.mean():8.4f} "
+                f"(<= {turned.max():6.4f})  {np.mean([r['duration_s'] for r in good]):7.0f}"
+                f"  {np.mean([r['pushes'] for r in good]):6.1f}"
+            )
+    for row in rows:
+        if not row["success"]:
+            print(f"{row['scenario']} seed {row['seed']}: {row['reason']}")
