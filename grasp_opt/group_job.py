@@ -73,6 +73,7 @@ class GroupJob:
         self.plan: GroupPlan | None = None
         self.last: GroupStep | None = None
         self._failures = 0
+        self._revived = False
         self._push: GroupPush | None = None
         self._mover: Mover | None = None
         self._watch: Obedience | None = None
@@ -87,7 +88,7 @@ class GroupJob:
         """Take a goal ``(3,)`` of the centre of mass; no job is under way."""
         self.goal, self.error = goal, JobError.NONE
         self.pushes = self.replans = self._failures = self.left = 0
-        self.plan = None
+        self.plan, self._revived = None, False
         self._enter(JobPhase.DETACHING, "robots come away from the object")
 
     def end(self, code: JobError, message: str) -> None:
@@ -110,9 +111,16 @@ class GroupJob:
         self._enter(JobPhase.POSITIONING, f"{count} robots go to their places")
 
     def failed(self, code: JobError, message: str) -> None:
-        """The answer to a request that cannot be met."""
-        if self.request is not None:
-            self.end(code, message)
+        """The answer to a request that cannot be met; with all robots it may be."""
+        if self.request is None:
+            return
+        self.request = None
+        if self.dead and not self._revived:
+            self._revived = True
+            self.dead = ()
+            self._enter(JobPhase.DETACHING, f"{message}; those that did not move are tried again")
+            return
+        self.end(code, message)
 
     def step(self, now: float, pose: Array, robots: Array) -> Array:
         """Twists ``(n, 2)`` of a tick. pose ``(3,)`` of the centre of mass, robots ``(n, 3)``."""

@@ -36,6 +36,7 @@ _WORTH, _FINALLY = 1e-3, 1e-6  # of the cost that a step must save, likewise
 _LAST = 3  # refined to the end
 _MARGINS = (0.1, 0.05, 0.0)  # that are asked for, one after another
 _HELD_AGAINST = 4000  # of the cheapest candidates, to find some that hold the task
+_GOLDEN = 0.6180339887498949
 _SLOWEST = 0.05  # of the greatest pace: at rest no force would move anything
 
 
@@ -226,6 +227,13 @@ class Placer:
         if allowed:
             found.append(np.array(allowed))
         return np.mod(np.vstack(found), total)
+
+    def exists(self) -> bool:
+        """Whether any of the candidates holds the task."""
+        candidates = self.candidates()
+        # Those far apart first: neighbours hold or fail together.
+        order = np.argsort(np.mod(np.arange(len(candidates)) * _GOLDEN, 1.0))
+        return any(self.holds(candidates[k]) for k in order)
 
     def best(self, points: int = 0, refined: int = _REFINED) -> Placement:
         """The best of all candidates, refined; or of a grid of so many points.

@@ -4,17 +4,23 @@ Planned anew after each piece, from where everybody is: nothing has to go as it 
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from grasp_opt.contact_outline import ContactOutline
 from grasp_opt.free_space import FreeSpace, Obstacles
 from grasp_opt.group_control import rigid
-from grasp_opt.object_trajectory import ObjectTrajectory, screw, screw_poses
+from grasp_opt.marshal import LEAST_BACK, Marshal, Move, NoStep
+from grasp_opt.object_trajectory import ObjectTrajectory, screw, screw_between, screw_poses
 from grasp_opt.object_way import NoObjectWay, WayFinder, pieces
-from grasp_opt.placement import NoPlacement, Placement, PlacementSettings, robust_placement
+from grasp_opt.placement import (
+    NoPlacement,
+    Placement,
+    PlacementSettings,
+    Placer,
+    robust_placement,
+)
 from push_model import se2
 from push_model.arrays import Array, Mask
 from push_model.occupancy import OccupancyGrid
@@ -24,8 +30,13 @@ from push_model.traction import lift_share, push_force, standing_traction
 
 _MOST = 5  # robots that are placed at once
 _ROOMS = (1.0, 0.5, 0.1)  # of the room round the object, one after another
-_LOOKED_AT = 6  # poses of a piece at which places are looked at
-_BACKS = (1.0, 0.6, 0.3)  # of the way back from a place, where there is less room behind it
+_LOOKED_AT = 0.04  # [m] between poses of a piece at which places are looked at
+_TWISTS = 60  # that are tried for detours
+_LENGTHS = (0.15, 0.3, 0.6, 1.0)  # [m] of their first pieces
+_DETOURS = 5  # of which the shortest is taken
+_ESCAPES = 12  # motions that are tried when there is none
+_SURE = 0.05  # of margin with which a detour must be held
+_SEED = 1
 
 
 @settings
@@ -43,22 +54,8 @@ class StepSettings:
     longest: float = bounded(1.5, low=0.05, high=100.0, doc="[m] of a piece; then all look again")
 
 
-class NoStep(Exception):
-    """Raised when a group can do nothing; says why."""
-
-
 class TooFew(NoStep):
     """Raised when so many robots have not the force."""
-
-
-@dataclass(frozen=True)
-class Move:
-    """A robot's way: points ``(n, 2)`` [m] with straight lines between, then a heading [rad]; None:
-    any."""
-
-    robot: int
-    points: Array
-    heading: float | None
 
 
 @dataclass(frozen=True)
@@ -98,6 +95,7 @@ class StepPlanner:
         room = 2.0 * self._radius + s.room
         self._finders = [WayFinder(self._space, self._shape, part * room) for part in _ROOMS]
         self._reach = float(np.hypot(*self._shape.T).max())
+        self._known: dict[int, list[Array]] = {}  # by the number of robots
 
     @property
     def force(self) -> float:
@@ -147,13 +145,68 @@ class StepPlanner:
                     return self._step(pose, motion, robots, alive, still, len(way))
                 except NoStep as error:
                     why = error
+            for motion in self._detours(*way[0], finder, Obstacles(discs=thin), len(alive)):
+                try:
+                    return self._step(pose, motion, robots, alive, still, len(way) + 1)
+                except NoStep as error:
+                    why = error
         raise why
+
+    def _detours(
+        self, pose: Array, motion: Array, finder: WayFinder, among: Obstacles, alive: int
+    ) -> list[Array]:
+        """First motions for a piece that robots cannot hold: those that they can, after which they
+        can hold what is left, the shortest first; and then whatever leads nearer to its end."""
+        count = min(_MOST, alive)
+        end = screw_poses(pose, motion, np.ones(1))[0]
+        found: list[tuple[float, Array]] = []
+        escapes: list[tuple[float, Array]] = []
+        random = np.random.default_rng(_SEED)
+        twists = self._holdable(count)
+        ways = [length * twist for twist in twists for length in _LENGTHS]
+        for k in random.permutation(len(ways)):
+            first = ways[k]
+            if not finder.keeps(pose, first, among):
+                continue
+            there = screw_poses(pose, first, np.ones(1))[0]
+            rest = screw_between(there, end)
+            escapes.append((self._size(rest), first))
+            if finder.keeps(there, rest, among) and self._can_hold(rest, count):
+                found.append((self._size(first) + self._size(rest), first))
+                if len(found) == _DETOURS:
+                    break
+        tried = [
+            [first for _, first in sorted(some, key=lambda pair: pair[0])[:most]]
+            for some, most in ((found, _DETOURS), (escapes, _ESCAPES))
+        ]
+        return [*tried[0], *tried[1]]
+
+    def _size(self, motion: Array) -> float:
+        return float(np.hypot(*motion[:2]) + self._reach * abs(motion[2]))
+
+    def _holdable(self, count: int) -> list[Array]:
+        """Twists of unit size that so many robots can hold, of many in all directions."""
+        if count not in self._known:
+            random = np.random.default_rng(_SEED)
+            drawn = random.normal(size=(_TWISTS, 3)) / [1.0, 1.0, self._reach]
+            twists = [t / self._size(t) for t in drawn]
+            self._known[count] = [t for t in twists if self._can_hold(t, count)]
+        return self._known[count]
+
+    def _can_hold(self, motion: Array, count: int) -> bool:
+        """Whether so many robots hold a motion from somewhere, were there nothing else."""
+        s = self.settings
+        task = screw(np.zeros(3), motion, s.speed, s.acceleration, self._reach)
+        asked = replace(
+            self._placement, least_margin=_SURE, only_pushing=True, most_force=self.force
+        )
+        return Placer(self._item, task, count, self._radius, asked).exists()
 
     def _first(
         self, pose: Array, motion: Array, finder: WayFinder, among: Obstacles
     ) -> list[Array]:
         """The first piece, not too long; else only its translation, only its turn."""
-        length = float(np.hypot(*motion[:2]) + self._reach * abs(motion[2]))
+        length = self._size(motion)
         motion = motion * min(1.0, self.settings.longest / length)
         end = se2.between(pose, screw_poses(pose, motion, np.ones(1))[0])
         turns = [np.array([0.0, 0.0, end[2]])] if abs(end[2]) > 0.05 else []
@@ -167,7 +220,8 @@ class StepPlanner:
     ) -> GroupPlan:
         s = self.settings
         trajectory = screw(pose, motion, s.speed, s.acceleration, self._reach + self._radius)
-        poses = screw_poses(pose, motion, np.linspace(0.0, 1.0, _LOOKED_AT))
+        looks = max(2, math.ceil(self._size(motion) / _LOOKED_AT) + 1)
+        poses = screw_poses(pose, motion, np.linspace(0.0, 1.0, looks))
         twist = motion / np.linalg.norm(motion)
         walls = Obstacles(discs=still)
 
@@ -176,7 +230,7 @@ class StepPlanner:
             centres = contacts.centres(self._radius)
             ahead = rigid(twist, centres)
             ahead /= np.maximum(1e-9, np.hypot(*ahead.T))[:, None]
-            met = se2.transform(pose, centres - (s.standoff + _BACKS[-1] * s.back) * ahead)
+            met = se2.transform(pose, centres - (s.standoff + LEAST_BACK * s.back) * ahead)
             points = np.vstack([met, *(se2.transform(p, centres) for p in poses)])
             room = self._space.room(points, walls).reshape(len(poses) + 1, -1)
             enough: Mask = np.all(room >= self._radius + 0.5 * s.clearance, axis=0)
@@ -221,149 +275,9 @@ class StepPlanner:
         places = np.column_stack([met, headings])
         outline = se2.transform(pose, self._shape)
         walls = Obstacles((outline,), still)
-        marshal = _Marshal(self._space, self._radius, s, walls, robots, alive)
+        marshal = Marshal(self._space, self._radius, s.clearance, s.back, walls, robots, alive)
         pushers = marshal.assign(places)
         swept = np.vstack([se2.transform(p, centres) for p in poses])
         marshal.clear(pushers, [se2.transform(p, self._shape) for p in poses], swept)
         marshal.send(pushers, places)
         return GroupPlan(pushers, placement, trajectory, marshal.batches(), left)
-
-
-class _Marshal:
-    """Finds who goes where, in which order and how."""
-
-    def __init__(
-        self,
-        space: FreeSpace,
-        radius: float,
-        settings: StepSettings,
-        walls: Obstacles,
-        robots: Array,
-        alive: list[int],
-    ) -> None:
-        self._space, self._radius, self._settings = space, radius, settings
-        self._walls, self._alive = walls, alive
-        self._at = {i: np.array(robots[i, :2]) for i in alive}
-        self._need = radius + settings.clearance
-        self._moves: list[Move] = []
-        self._asides: dict[int, int] = {}  # how often a robot went aside
-
-    def _among(self, robot: int) -> Obstacles:
-        """What stands in a robot's way: everything, and the others where they are by then."""
-        discs = [[*self._at[i], self._radius] for i in self._alive if i != robot]
-        return Obstacles(
-            self._walls.outlines, np.vstack([self._walls.discs, np.reshape(discs, (-1, 3))])
-        )
-
-    def assign(self, places: Array) -> tuple[int, ...]:
-        """Which robot takes each place: the least sum of ways round what stands still."""
-        cost = np.full((len(self._alive), len(places)), 1e3)
-        for k, robot in enumerate(self._alive):
-            reach = self._space.from_here(self._at[robot], self._need, self._walls)
-            for j, place in enumerate(places):
-                way = reach.way_to(self._before(place, self._settings.back))
-                if way is not None:
-                    cost[k, j] = float(np.hypot(*np.diff(way, axis=0).T).sum())
-        rows, columns = linear_sum_assignment(cost)
-        chosen = dict(zip(columns.tolist(), rows.tolist(), strict=True))
-        return tuple(self._alive[chosen[j]] for j in range(len(places)))
-
-    @staticmethod
-    def _before(place: Array, back: float) -> Array:
-        """``(2,)`` so far straight behind a place ``(3,)``."""
-        return np.array(place[:2]) - back * np.array([math.cos(place[2]), math.sin(place[2])])
-
-    def clear(self, pushers: tuple[int, ...], outlines: list[Array], swept: Array) -> None:
-        """Send those who do not push out of the way of object and pushers, if they are in it."""
-        for robot in self._alive:
-            if robot in pushers:
-                continue
-            here = self._at[robot][None]
-            if self._out_of_the_way(here, outlines, swept)[0]:
-                continue
-            self._park(robot, outlines, swept)
-
-    def _out_of_the_way(self, points: Array, outlines: list[Array], swept: Array) -> Mask:
-        away = self._space.room(points, Obstacles(tuple(outlines)))
-        others = np.min([np.hypot(*(points - p).T) for p in swept], axis=0)
-        clear: Mask = (away >= 3.0 * self._need) & (others >= 4.0 * self._need)
-        return clear
-
-    def _park(self, robot: int, outlines: list[Array], swept: Array) -> bool:
-        reach = self._space.from_here(self._at[robot], self._need, self._among(robot))
-        good = np.isfinite(reach.lengths)
-        good[good] = self._out_of_the_way(self._space.places[good], outlines, swept)
-        if not good.any():
-            return False
-        place = int(np.argmin(np.where(good, reach.lengths, np.inf)))
-        self._go(Move(robot, reach.way_to_place(place), None))
-        return True
-
-    def _go(self, move: Move) -> None:
-        self._moves.append(move)
-        self._at[move.robot] = move.points[-1]
-
-    def send(self, pushers: tuple[int, ...], places: Array) -> None:
-        """Ways to the places, one after the other; who stands in the way of all others goes aside.
-
-        Raises
-        ------
-        NoStep: somebody has no way.
-        """
-        to_go = dict(zip(pushers, places, strict=True))
-        asides = 2 * len(to_go)
-        while to_go:
-            gone = [robot for robot, place in to_go.items() if self._try(robot, place)]
-            for robot in gone:
-                del to_go[robot]
-            if gone:
-                continue
-            asides -= 1
-            blockers = sorted(to_go, key=lambda r: self._asides.get(r, 0))
-            outline = list(self._walls.outlines)
-            if asides < 0 or not any(
-                self._park(r, outline, np.array([p[:2] for p in places])) for r in blockers[:1]
-            ):
-                raise NoStep("robots stand in each other's way to their places")
-            self._asides[blockers[0]] = self._asides.get(blockers[0], 0) + 1
-
-    def _try(self, robot: int, place: Array) -> bool:
-        among = self._among(robot)
-        reach = self._space.from_here(self._at[robot], self._need, among)
-        for part in _BACKS:
-            before = self._before(place, part * self._settings.back)
-            last = self._space.line_keeps(before, place[:2], self._radius + 2e-3, among)
-            room = float(self._space.room(np.array([before, place[:2]]), among).min())
-            if not last or room < self._radius + 1e-3:
-                continue
-            way = reach.way_to(before)
-            if way is not None:
-                self._go(Move(robot, np.vstack([way, place[:2]]), float(place[2])))
-                return True
-        return False
-
-    def batches(self) -> tuple[tuple[Move, ...], ...]:
-        """Moves one after the other, or together where they keep clear of each other."""
-        found: list[list[Move]] = []
-        for move in self._moves:
-            together = found and all(self._apart(move, other) for other in found[-1])
-            if together:
-                found[-1].append(move)
-            else:
-                found.append([move])
-        return tuple(tuple(batch) for batch in found)
-
-    def _apart(self, first: Move, second: Move) -> bool:
-        if first.robot == second.robot:
-            return False
-        a, b = _dense(first.points), _dense(second.points)
-        gap = np.hypot(a[:, None, 0] - b[None, :, 0], a[:, None, 1] - b[None, :, 1]).min()
-        return bool(gap >= 2.0 * self._radius + 2.0 * self._settings.clearance)
-
-
-def _dense(points: Array) -> Array:
-    parts = [points[:1]]
-    for a, b in zip(points[:-1], points[1:], strict=True):
-        steps = max(2, math.ceil(float(np.hypot(*(b - a))) / 0.02) + 1)
-        parts.append(a + np.linspace(0.0, 1.0, steps)[1:, None] * (b - a))
-    return np.vstack(parts)
