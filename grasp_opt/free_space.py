@@ -19,6 +19,7 @@ from push_model.occupancy import OccupancyGrid
 from push_model.outlines import distance, inside
 
 _NEAR = 0.12  # [m] from an end of a way within which it joins the lattice
+_INEXACT = math.sqrt(0.5) + 0.125  # [cells]
 _SAMPLE = 0.01  # [m] between points of a line that are looked at
 
 
@@ -63,11 +64,11 @@ class FreeSpace:
         """``(n,)`` [m] from points ``(n, 2)`` to the map's obstacles and edges; 0 in them.
 
         Distances between the cells' centres are more than those to their squares by at most half a
-        diagonal, which is taken off.
+        diagonal, and between the centres they are interpolated: both are taken off.
         """
         where = (np.asarray(points) - self._origin).T / self._cell
         found = map_coordinates(self._field, where[::-1], order=1, mode="constant", cval=0.0)
-        room: Array = np.maximum(0.0, found - math.sqrt(0.5) * self._cell)
+        room: Array = np.maximum(0.0, found - _INEXACT * self._cell)
         return room
 
     def room(self, points: Array, among: Obstacles) -> Array:

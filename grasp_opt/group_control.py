@@ -63,14 +63,15 @@ class GroupCommand:
     """What one tick asks for.
 
     wrench ``(3,)`` in the object's frame; forces ``(n, 2)`` [N] likewise; lacking: part of the
-    wrench that they do not make; gaps ``(n,)`` [m] between robots and object; velocities ``(n, 2)``
-    [m/s] of robots in the world's frame.
+    wrench that they do not make; gaps ``(n,)`` [m] between robots and object; contacts: where the
+    robots are now; velocities ``(n, 2)`` [m/s] of robots in the world's frame.
     """
 
     wrench: Array
     forces: Array
     lacking: float
     gaps: Array
+    contacts: Contacts
     velocities: Array
 
 
@@ -172,7 +173,7 @@ class GroupController:
             moved += off_place - (off_place * normals).sum(axis=1)[:, None] * normals
             moved += self._inward(gaps, forces, normals, touching)[:, None] * normals
         world = se2.rotation_matrix(float(pose[2]))
-        return GroupCommand(wrench, forces, lacking, gaps, moved @ world.T)
+        return GroupCommand(wrench, forces, lacking, gaps, contacts, moved @ world.T)
 
     def _inward(self, gaps: Array, forces: Array, normals: Array, touching: Mask) -> Array:
         """``(n,)`` [m/s] towards the object: what is away comes, who is to carry more goes ahead.

@@ -13,6 +13,7 @@ from grasp_opt.contact_outline import ContactOutline
 from grasp_opt.group_control import GroupControlSettings
 from grasp_opt.group_push import GroupPush, GroupPushSettings, GroupStep, Obedience, Phase
 from grasp_opt.moves import Mover, MoveSettings, back_off
+from grasp_opt.object_trajectory import ObjectTrajectory
 from grasp_opt.step_planner import GroupPlan
 from push_model import se2
 from push_model.arrays import Array
@@ -34,12 +35,14 @@ class GroupJobSettings:
 
 @dataclass(frozen=True)
 class Request:
-    """What the next step is to be planned for; poses of the centre of mass."""
+    """What the next step is to be planned for; poses of the centre of mass. trajectory: that is to
+    be followed, where one was given instead of a goal."""
 
     pose: Array
     goal: Array
     robots: Array
     dead: tuple[int, ...]
+    trajectory: ObjectTrajectory | None = None
 
 
 class GroupJob:
@@ -74,6 +77,7 @@ class GroupJob:
         self.last: GroupStep | None = None
         self._failures = 0
         self._revived = False
+        self._along: ObjectTrajectory | None = None
         self._push: GroupPush | None = None
         self._mover: Mover | None = None
         self._watch: Obedience | None = None
@@ -88,8 +92,13 @@ class GroupJob:
         """Take a goal ``(3,)`` of the centre of mass; no job is under way."""
         self.goal, self.error = goal, JobError.NONE
         self.pushes = self.replans = self._failures = self.left = 0
-        self.plan, self._revived = None, False
+        self.plan, self._along, self._revived = None, None, False
         self._enter(JobPhase.DETACHING, "robots come away from the object")
+
+    def begin_along(self, trajectory: ObjectTrajectory) -> None:
+        """Take a trajectory of the centre of mass instead: one push, and no other."""
+        self.begin(trajectory.pose[-1])
+        self._along = trajectory
 
     def end(self, code: JobError, message: str) -> None:
         """End the job under way."""
@@ -162,7 +171,7 @@ class GroupJob:
             )
         self._failures += 1
         self.replans += 1
-        if self._failures > self.settings.failures:
+        if self._failures > self.settings.failures or (self._along and self.pushes):
             self.end(JobError.EXECUTION_FAILED, reason)
             return
         self._enter(JobPhase.DETACHING, reason)
@@ -189,12 +198,12 @@ class GroupJob:
         if away <= s.position_tolerance and turned <= s.orientation_tolerance:
             self.end(JobError.NONE, f"at the goal: {1e3 * away:.1f} mm, {turned:.3f} rad")
             return
-        if self.pushes >= s.steps:
+        if self.pushes >= (1 if self._along else s.steps):
             text = f"{1e3 * away:.1f} mm and {turned:.3f} rad off after {self.pushes} pushes"
             self.end(JobError.OFF_TARGET, text)
             return
         self._enter(JobPhase.PLANNING, "planning the next step")
-        self.request = Request(pose.copy(), self.goal, robots.copy(), self.dead)
+        self.request = Request(pose.copy(), self.goal, robots.copy(), self.dead, self._along)
 
     def _go(self, now: float, pose: Array, robots: Array) -> Array:
         assert self._mover is not None and self.plan is not None
@@ -234,6 +243,7 @@ class GroupJob:
             self.last = step
         elif step.phase is Phase.DONE:
             self._failures = 0
+            self.left = max(0, self.left - 1)
             self._since = now
             self._enter(JobPhase.DETACHING, "the piece is done")
         elif step.phase is Phase.FAILED:

@@ -54,6 +54,18 @@ class ObjectTrajectory:
         return np.array([np.interp(t, self.time, column) for column in self.twist.T])
 
 
+def sampled(time: Array, pose: Array) -> ObjectTrajectory:
+    """Through given poses ``(n, 3)``, headings continuous, at times ``(n,)`` [s] from 0.
+
+    Raises
+    ------
+    ValueError: times do not ascend from 0, or there are fewer than three.
+    """
+    if len(time) < 3 or time[0] != 0.0 or (np.diff(time) <= 0.0).any():
+        raise ValueError("three times or more are needed, which ascend from 0")
+    return ObjectTrajectory(time, pose, np.gradient(pose, time, axis=0))
+
+
 def along(
     curve: Callable[[Array], Array], end: float, speed: float, acceleration: float
 ) -> ObjectTrajectory:

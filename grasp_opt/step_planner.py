@@ -51,6 +51,7 @@ class StepSettings:
     acceleration: float = bounded(0.05, low=1e-3, high=50.0, doc="[m/s^2] likewise")
     force_share: float = bounded(0.85, low=0.1, high=1.0, doc="of its traction that a robot gives")
     margin: float = bounded(0.1, low=0.0, high=1.0, doc="of the compatibility test that is enough")
+    steps: int = bounded(8, low=5, high=1000, doc="N of (3.16) for a piece, which is one wrench")
     longest: float = bounded(1.5, low=0.05, high=100.0, doc="[m] of a piece; then all look again")
 
 
@@ -85,9 +86,11 @@ class StepPlanner:
         settings: StepSettings | None = None,
         placement: PlacementSettings | None = None,
     ) -> None:
-        """item, robot: as believed. placement: weights; a piece is one wrench, so few steps do."""
+        """item, robot: as believed. placement: of trajectories that are given; pieces of the way
+        to a goal have fewer steps."""
         self.settings = s = settings or StepSettings()
-        self._placement = placement or PlacementSettings(steps=8)
+        self._weights = placement or PlacementSettings()
+        self._placement = replace(self._weights, steps=s.steps)
         self._space, self._item, self._robot = FreeSpace(grid), item, robot
         self._outline = ContactOutline(item.geometry)
         self._shape = item.geometry.outline
@@ -123,14 +126,7 @@ class StepPlanner:
         NoStep
         """
         alive = [i for i in range(len(robots)) if i not in dead]
-        needed = push_force(self._item)
-        if needed > self.force * min(len(alive), _MOST):
-            raise TooFew(
-                f"the object needs {needed:.2f} N, {len(alive)} robots of "
-                f"{self.force:.2f} N have {self.force * len(alive):.2f} N"
-            )
-        standing = [[*robots[i, :2], self._radius] for i in dead]
-        still = np.vstack([np.reshape(standing, (-1, 3)), np.reshape(others, (-1, 3))])
+        still = self._still(robots, dead, others)
         why: Exception = NoStep("there is no way for the object")
         for finder in self._finders:
             # What stands beside the object is a little smaller: they may touch.
@@ -151,6 +147,37 @@ class StepPlanner:
                 except NoStep as error:
                     why = error
         raise why
+
+    def along(
+        self,
+        trajectory: ObjectTrajectory,
+        pose: Array,
+        robots: Array,
+        dead: tuple[int, ...],
+        others: Array,
+    ) -> GroupPlan:
+        """Places and moves for one push along a trajectory that somebody gives; see ``plan``.
+
+        Raises
+        ------
+        NoStep: also when the object does not keep clear of everything on it.
+        """
+        alive = [i for i in range(len(robots)) if i not in dead]
+        still = self._still(robots, dead, others)
+        reach = self._reach + self._radius
+        count = max(2, math.ceil((trajectory.length + _turned(trajectory) * reach) / _LOOKED_AT))
+        times = np.linspace(0.0, trajectory.duration, count)
+        poses = np.array([trajectory.sample(t) for t in times])
+        room = self._finders[0].clearance(poses, Obstacles(discs=still))
+        if room.min() < self.settings.clearance:
+            k = int(np.argmin(room))
+            raise NoStep(f"the object is too close to something {times[k]:.1f} s along its way")
+        return self._push(pose, trajectory, poses, self._weights, robots, alive, still, 1)
+
+    def _still(self, robots: Array, dead: tuple[int, ...], others: Array) -> Array:
+        """``(k, 3)`` discs that stand in the way for ever."""
+        standing = [[*robots[i, :2], self._radius] for i in dead]
+        return np.vstack([np.reshape(standing, (-1, 3)), np.reshape(others, (-1, 3))])
 
     def _detours(
         self, pose: Array, motion: Array, finder: WayFinder, among: Obstacles, alive: int
@@ -222,7 +249,21 @@ class StepPlanner:
         trajectory = screw(pose, motion, s.speed, s.acceleration, self._reach + self._radius)
         looks = max(2, math.ceil(self._size(motion) / _LOOKED_AT) + 1)
         poses = screw_poses(pose, motion, np.linspace(0.0, 1.0, looks))
-        twist = motion / np.linalg.norm(motion)
+        return self._push(pose, trajectory, poses, self._placement, robots, alive, still, left)
+
+    def _push(
+        self,
+        pose: Array,
+        trajectory: ObjectTrajectory,
+        poses: Array,
+        weights: PlacementSettings,
+        robots: Array,
+        alive: list[int],
+        still: Array,
+        left: int,
+    ) -> GroupPlan:
+        """The fewest robots that hold a trajectory well enough, with their places and moves."""
+        s, twist = self.settings, _first_twist(trajectory)
         walls = Obstacles(discs=still)
 
         def free(way: Array) -> Mask:
@@ -236,12 +277,18 @@ class StepPlanner:
             enough: Mask = np.all(room >= self._radius + 0.5 * s.clearance, axis=0)
             return enough
 
+        needed = push_force(self._item)
+        if needed > self.force * min(len(alive), _MOST):
+            raise TooFew(
+                f"the object needs {needed:.2f} N, {len(alive)} robots of "
+                f"{self.force:.2f} N have {self.force * len(alive):.2f} N"
+            )
         why: Exception = NoStep("no robots")
-        fewest = math.ceil(push_force(self._item) / self.force)
+        fewest = math.ceil(needed / self.force)
         for count in range(fewest, min(_MOST, len(alive)) + 1):
             try:
                 placement = robust_placement(
-                    self._item, trajectory, count, self._radius, self.force, self._placement, free
+                    self._item, trajectory, count, self._radius, self.force, weights, free
                 )
                 if placement.margin < s.margin - 1e-9 and count < min(_MOST, len(alive)):
                     why = NoStep("too little margin")
@@ -267,8 +314,7 @@ class StepPlanner:
         left: int,
     ) -> GroupPlan:
         s, centres = self.settings, placement.contacts.centres(self._radius)
-        moving = int(np.argmax(np.linalg.norm(trajectory.body_twists, axis=1) > 0.0))
-        ahead = rigid(trajectory.body_twists[moving], centres)
+        ahead = rigid(_first_twist(trajectory), centres)
         ahead /= np.hypot(*ahead.T)[:, None]
         met = se2.transform(pose, centres - s.standoff * ahead)
         headings = pose[2] + np.arctan2(ahead[:, 1], ahead[:, 0])
@@ -281,3 +327,14 @@ class StepPlanner:
         marshal.clear(pushers, [se2.transform(p, self._shape) for p in poses], swept)
         marshal.send(pushers, places)
         return GroupPlan(pushers, placement, trajectory, marshal.batches(), left)
+
+
+def _first_twist(trajectory: ObjectTrajectory) -> Array:
+    """``(3,)`` in the object's frame, as it begins to move."""
+    moving = np.linalg.norm(trajectory.body_twists, axis=1) > 0.0
+    first: Array = trajectory.body_twists[int(np.argmax(moving))]
+    return first
+
+
+def _turned(trajectory: ObjectTrajectory) -> float:
+    return float(np.abs(np.diff(trajectory.pose[:, 2])).sum())

@@ -11,9 +11,9 @@ from pathlib import Path
 from planar_push.words import (
     add_factor,
     add_namespace,
-    add_scenario,
-    add_system,
+    add_system_and_scenario,
     add_timeout,
+    scenario_of,
     stop_on_signals,
     tell,
 )
@@ -24,8 +24,7 @@ _POSITION, _ORIENTATION = 0.02, 0.1  # [m], [rad] of a demonstration that succee
 
 def add_words(parser: argparse.ArgumentParser) -> None:
     """The words of this verb."""
-    add_system(parser)
-    add_scenario(parser)
+    add_system_and_scenario(parser)
     parser.add_argument("--out", default="results/demo", help="folder; replaces an earlier demo")
     add_factor(parser)
     add_timeout(parser, 220.0)
@@ -40,7 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
     from push_view.report import PRODUCTS, write_report
 
     out = Path(arguments.out)
-    scenario = load_scenario(arguments.scenario)
+    scenario = load_scenario(scenario_of(arguments))
     goals = scenario_goals(scenario)
     words = {
         "system": arguments.system,

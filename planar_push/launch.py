@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from planar_push.words import (
     add_factor,
     add_namespace,
-    add_scenario,
-    add_system,
+    add_system_and_scenario,
+    scenario_of,
     stop_on_signals,
 )
 
@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
 def add_words(parser: argparse.ArgumentParser) -> None:
     """The words of this verb."""
-    add_system(parser)
-    add_scenario(parser)
+    add_system_and_scenario(parser)
     parser.add_argument("--record", default="", help="bag folder")
     parser.add_argument("--respawn", action="store_true", help="start a node that died again")
     add_factor(parser)
@@ -33,7 +32,7 @@ def run(arguments: argparse.Namespace) -> int:
     from push_bringup.preparation import check_domain, prepare
 
     setup = prepare(
-        arguments.scenario,
+        scenario_of(arguments),
         system=arguments.system,
         namespace=arguments.namespace,
         record=arguments.record,
@@ -44,7 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
         launcher = Launcher(setup.write(Path(folder)), respawn=arguments.respawn)
         stop_on_signals(launcher.request_stop)
         launcher.start()
-        print(f"running {arguments.scenario}; {_what_next(setup)}", flush=True)
+        print(f"running {setup.scenario.name}; {_what_next(setup)}", flush=True)
         return launcher.run()
 
 
@@ -52,7 +51,7 @@ def _what_next(setup: "SuiteSetup") -> str:
     """How to make it do something."""
     from push_bringup.systems import teams_of
 
-    if all(node.kind != "supervisor" for node in setup.nodes):
+    if not any(node.kind in ("supervisor", "group") for node in setup.nodes):
         spaces = [n.namespace for n in setup.nodes if n.kind == "torque_controller"]
         return "send trajectories to: " + ", ".join(f"{s}/follow_trajectory" for s in spaces)
     words = f" --namespace {setup.namespace}" if setup.namespace else ""

@@ -19,6 +19,24 @@ def add_scenario(parser: argparse.ArgumentParser, default: str | None = "env1-ta
     )
 
 
+SCENARIOS = {"single": "env1-target1", "torque": "wheel-slip", "group": "group-ellipse"}
+"""Of each system, where none is named."""
+
+
+def add_system_and_scenario(parser: argparse.ArgumentParser) -> None:
+    """The system, of those that are there, and ``--scenario``; ``scenario_of`` tells which."""
+    parser.add_argument("system", choices=list(SYSTEMS), nargs="?", default="single")
+    known = ", ".join(f"{name} for {system}" for system, name in SCENARIOS.items())
+    parser.add_argument(
+        "--scenario", default="", help=f"a name in config/scenarios, or a file; {known}"
+    )
+
+
+def scenario_of(arguments: argparse.Namespace) -> str:
+    """Name or path of the scenario that was asked for."""
+    return str(arguments.scenario or SCENARIOS[arguments.system])
+
+
 def add_namespace(parser: argparse.ArgumentParser) -> None:
     """``--namespace``."""
     parser.add_argument("--namespace", default="", help="of the whole suite, e.g. a or lab/a")
@@ -37,11 +55,6 @@ def add_factor(parser: argparse.ArgumentParser) -> None:
 def add_timeout(parser: argparse.ArgumentParser, default: float) -> None:
     """``--timeout``."""
     parser.add_argument("--timeout", type=positive, default=default, help="[s] wall time")
-
-
-def add_system(parser: argparse.ArgumentParser) -> None:
-    """The system, of those that are there."""
-    parser.add_argument("system", choices=list(SYSTEMS), nargs="?", default="single")
 
 
 def positive(text: str) -> float:

@@ -4,6 +4,12 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
+from grasp_opt.group_control import GroupControlSettings
+from grasp_opt.group_job import GroupJobSettings
+from grasp_opt.group_push import GroupPushSettings
+from grasp_opt.moves import MoveSettings
+from grasp_opt.placement import PlacementSettings
+from grasp_opt.step_planner import StepSettings
 from push_estimation.pose_gate import PoseGateSettings
 from push_model.settings import SettingsError, from_mapping
 from push_mpc.controllers import controller_kind
@@ -30,6 +36,14 @@ SECTIONS: dict[str, dict[str, type[Any]]] = {
         "poses": PoseGateSettings,
     },
     "supervisor": {"": SupervisorSettings, "poses": PoseGateSettings},
+    "group": {
+        "": GroupJobSettings,
+        "push": GroupPushSettings,
+        "control": GroupControlSettings,
+        "moves": MoveSettings,
+        "poses": PoseGateSettings,
+    },
+    "optimizer": {"": StepSettings, "placement": PlacementSettings},
     "torque_controller": {
         "nmpc": WheelSlipSettings,
         "tracker": TorqueTrackerSettings,

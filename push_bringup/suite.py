@@ -72,7 +72,7 @@ class Suite:
         self.scenario = self.setup.scenario
         self._respawn, self._verbose = respawn, verbose
         self._on_event = on_event or (lambda event: None)
-        self._quiet = (MODULES["supervisor"],) if on_event else ()
+        self._quiet = (MODULES["supervisor"], MODULES["group"]) if on_event else ()
         self._context = context
         self._stack = ExitStack()
         self._launcher: Launcher | None = None

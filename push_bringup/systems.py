@@ -11,7 +11,8 @@ from typing import Any
 
 from rclpy.node import Node
 
-from push_model.drives import TorqueDrive
+from push_model.bumpers import RingBumper
+from push_model.drives import SpeedDrive, TorqueDrive
 from push_model.settings import SettingsError
 from push_ros.names import inside, space
 from push_scenario.scenario import Scenario
@@ -25,12 +26,17 @@ LOCKSTEP: dict[str, dict[str, Any]] = {"bridge": {"lockstep_timeout": 60.0}}
 """Settings of a run in lockstep, where the scenario is silent. All nodes are in one process: who is
 waited for [s] is never dead, it is the machine that is busy."""
 
+GROUP_MOST = 5
+"""Robots of a group at most."""
+
 MODULES = {
     "bridge": "sim_bridge.node",
     "planner": "push_planner.node",
     "controller": "push_mpc.node",
     "supervisor": "push_supervisor.node",
     "torque_controller": "push_mpc.torque_node",
+    "group": "grasp_opt.node",
+    "optimizer": "grasp_opt.optimizer_node",
     "recorder": "push_record.recorder",
 }
 """Kind of a node to the module whose ``main`` runs it in a process of its own."""
@@ -42,7 +48,7 @@ class NodeSpec:
 
     name: what it is called in messages to people; unique in the system.
     kind: key of ``MODULES``. namespace: where it lives. world: namespace of the bridge.
-    robot, item, team: whom it serves; empty where it serves all.
+    robot, robots, item, team: whom it serves; empty where it serves all.
     parameters: further ROS parameters. remaps: names to names, besides the namespace.
     """
 
@@ -53,17 +59,20 @@ class NodeSpec:
     robot: str = ""
     item: str = ""
     team: str = ""
+    robots: tuple[str, ...] = ()
     parameters: Mapping[str, Any] = field(default_factory=dict)
     remaps: Mapping[str, str] = field(default_factory=dict)
 
     def words(self, scenario: str) -> list[str]:
         """Command line of its process; scenario: name or path of the file that it reads."""
         values: dict[str, Any] = {"scenario": scenario, **self.parameters}
-        if self.kind in ("planner", "supervisor", "recorder"):
+        if self.kind in ("planner", "supervisor", "group", "optimizer", "recorder"):
             values["world"] = self.world
         if self.kind in ("controller", "supervisor", "torque_controller"):
             values["robot"] = self.robot
-        if self.kind == "supervisor":
+        if self.kind in ("group", "optimizer"):
+            values["robots"] = list(self.robots)
+        if self.kind in ("supervisor", "group", "optimizer"):
             values["object"] = self.item
         remaps = {"__ns": self.namespace, **self.remaps}
         words = ["--ros-args"]
@@ -110,12 +119,26 @@ def _torque_controller(spec: NodeSpec, scenario: Scenario) -> Node:
     return TorqueControllerNode(scenario, spec.robot, namespace=spec.world)
 
 
+def _group(spec: NodeSpec, scenario: Scenario) -> Node:
+    from grasp_opt.node import GroupNode
+
+    return GroupNode(scenario, spec.robots, spec.item, spec.namespace, spec.world)
+
+
+def _optimizer(spec: NodeSpec, scenario: Scenario) -> Node:
+    from grasp_opt.optimizer_node import OptimizerNode
+
+    return OptimizerNode(scenario, spec.robots, spec.item, spec.namespace, spec.world)
+
+
 _MAKERS: dict[str, Callable[[NodeSpec, Scenario], Node]] = {
     "bridge": _bridge,
     "planner": _planner,
     "controller": _controller,
     "supervisor": _supervisor,
     "torque_controller": _torque_controller,
+    "group": _group,
+    "optimizer": _optimizer,
 }
 
 
@@ -186,9 +209,61 @@ def torque(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
     )
 
 
+def group(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
+    """Two to five robots that push one object, for each team; all in one world.
+
+    Raises
+    ------
+    SettingsError: a team has fewer than two robots, or more; robots of several types, or without a
+        round bumper; no object, or one whose outline is not convex.
+    """
+    world = _absolute(namespace)
+    nodes = [NodeSpec("bridge", "bridge", world, world)]
+    for team in teams_of(scenario):
+        whose = f"scenario '{scenario.name}': " + (f"team '{team.name}'" if team.name else "it")
+        count = len(team.robots)
+        if not 2 <= count <= GROUP_MOST:
+            raise SettingsError(
+                f"{whose} has {count} robots, the system 'group' takes 2 to {GROUP_MOST} a team"
+            )
+        if not team.object:
+            raise SettingsError(f"{whose} has no object to push")
+        types = [scenario.robots[name][0] for name in team.robots]
+        if any(t != types[0] for t in types):
+            raise SettingsError(f"{whose} has robots of several types, a group is of one type")
+        if not isinstance(types[0].bumper, RingBumper) or not isinstance(
+            types[0].drive, SpeedDrive
+        ):
+            raise SettingsError(
+                f"{whose} has robots without a ring bumper and wheels of controlled speed, which "
+                "a group needs"
+            )
+        if not scenario.objects[team.object][0].geometry.convex:
+            raise SettingsError(
+                f"{whose} pushes '{team.object}', whose outline is not convex: groups push "
+                "convex objects"
+            )
+        place = team_space(namespace, team.name)
+        prefix = f"{team.name}/" if team.name else ""
+        nodes += [
+            NodeSpec(
+                f"{prefix}{kind}",
+                kind,
+                place,
+                world,
+                robots=team.robots,
+                item=team.object,
+                team=team.name,
+            )
+            for kind in ("optimizer", "group")
+        ]
+    return tuple(nodes)
+
+
 SYSTEMS: dict[str, Callable[[Scenario, str], tuple[NodeSpec, ...]]] = {
     "single": single,
     "torque": torque,
+    "group": group,
 }
 """Name of a system to the function that lists its nodes for a scenario in a namespace."""
 

@@ -25,6 +25,19 @@ STATUS = (
 )
 """Columns of a controller's status, see push_msgs/ControllerStatus."""
 
+GROUP_STATUS = (
+    "time",
+    "position_error",
+    "orientation_error",
+    "lacking",
+    "margin",
+    "solve_time",
+    "wrench_x",
+    "wrench_y",
+    "wrench_torque",
+)
+"""Columns of a group's status, see push_msgs/GroupStatus."""
+
 _SPACING = 0.02  # [s] least, between frames that are kept
 _MOVING = (1, 2)  # modes MOVE and PUSH of ControllerStatus
 
@@ -40,8 +53,24 @@ class State:
 
 
 @dataclass
+class GroupPushes:
+    """One push of a group: pushers, and rows of numbers at its ticks.
+
+    rows: of GROUP_STATUS. points, normals, forces: ``(n, 2)`` each, fixed frame, by tick.
+    """
+
+    pushers: tuple[str, ...]
+    friction: float
+    rows: list[list[float]] = field(default_factory=list)
+    points: list[Array] = field(default_factory=list)
+    normals: list[Array] = field(default_factory=list)
+    forces: list[Array] = field(default_factory=list)
+
+
+@dataclass
 class Job:
-    """What a team did. goal ``(3,)``: the last one; plan: ``(n, 2)`` [m] of each push's axle."""
+    """What a team did. goal ``(3,)``: the last one; plan: ``(n, 2)`` [m] of each push's axle, or of
+    the object that a group pushes; pushes: of a group."""
 
     space: str
     system: str = ""
@@ -50,6 +79,7 @@ class Job:
     states: list[State] = field(default_factory=list)
     goal: Array | None = None
     plan: list[Array] = field(default_factory=list)
+    pushes: list["GroupPushes"] = field(default_factory=list)
 
 
 @dataclass
@@ -145,7 +175,13 @@ def load(bag: Path) -> BagContents:
     frames = _Frames((*scenario.robots, *scenario.objects))
     status: dict[str, list[list[float]]] = {}
     wanted = _Suffixes(
-        "ground_truth/poses", "job_state", "push_plan", "contacts", "controller/status"
+        "ground_truth/poses",
+        "job_state",
+        "push_plan",
+        "group_plan",
+        "group_status",
+        "contacts",
+        "controller/status",
     )
     for record in read_bag(bag, cast(set[str], wanted)):
         m = record.message
@@ -162,6 +198,11 @@ def load(bag: Path) -> BagContents:
             job = contents.jobs.setdefault(space, Job(space))
             if record.topic.endswith("/job_state"):
                 _take_state(job, m)
+            elif record.topic.endswith("/group_plan"):
+                job.plan.append(np.column_stack([m.x, m.y]))
+                job.pushes.append(GroupPushes(tuple(m.pushers), 0.0))
+            elif record.topic.endswith("/group_status"):
+                _take_group_status(job, m)
             else:
                 job.plan = [np.column_stack([s.trajectory.x, s.trajectory.y]) for s in m.segments]
     contents.time, contents.poses = frames.finish()
@@ -169,6 +210,24 @@ def load(bag: Path) -> BagContents:
         table = np.array(rows, dtype=np.float64)
         contents.status[robot] = dict(zip(STATUS, table.T, strict=True))
     return contents
+
+
+def _take_group_status(job: Job, message: Any) -> None:
+    if not job.pushes or not len(message.force_x):
+        return
+    push = job.pushes[-1]
+    if push.pushers != tuple(message.pushers):
+        return
+    push.friction = float(message.friction)
+    push.rows.append(
+        [_seconds(message.header.stamp), *(getattr(message, k) for k in GROUP_STATUS[1:])]
+    )
+    for kept, x, y in (
+        (push.points, message.contact_x, message.contact_y),
+        (push.normals, message.normal_x, message.normal_y),
+        (push.forces, message.force_x, message.force_y),
+    ):
+        kept.append(np.column_stack([x, y]))
 
 
 def _take_state(job: Job, message: Any) -> None:

@@ -15,6 +15,8 @@ from visualization_msgs.msg import MarkerArray
 from push_msgs.msg import (
     Contacts,
     ControllerStatus,
+    GroupPlan,
+    GroupStatus,
     JobState,
     Poses,
     PushPlan,
@@ -64,6 +66,8 @@ TEAM = {
     "goal_pose": Topic(PoseStamped, COMMAND),
     "push_plan": Topic(PushPlan, LATCHED),
     "push_path": Topic(PathMessage, LATCHED),
+    "group_plan": Topic(GroupPlan, LATCHED),
+    "group_status": Topic(GroupStatus, STATUS),
     "job_state": Topic(JobState, LATCHED),
     "status_text": Topic(String, LATCHED),
 }

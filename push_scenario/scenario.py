@@ -52,7 +52,15 @@ __all__ = [
     "scenario_names",
 ]
 
-NODES = ("bridge", "planner", "controller", "supervisor", "torque_controller")
+NODES = (
+    "bridge",
+    "planner",
+    "controller",
+    "supervisor",
+    "torque_controller",
+    "group",
+    "optimizer",
+)
 """Nodes that a scenario may have parameters for."""
 
 

@@ -27,10 +27,13 @@ from push_ros.process import Spinner, prepare_environment
 from push_scenario.scenario import Scenario
 from push_study.observer import Observer
 
+_ROLES = ("controller", "planner", "supervisor")
+_OWNERS = ("supervisor", "group")
+
 
 @dataclass
 class TeamRun:
-    """The nodes of a team, and who watches it."""
+    """The nodes of a team, and who watches it. A group's node is its controller and supervisor."""
 
     controller: Any
     planner: Any
@@ -111,8 +114,9 @@ class LockstepRun:
             self.teams: dict[str, TeamRun] = {}
             for team in teams_of(scenario):
                 parts = {s.kind: s for s in specs if s.kind != "bridge" and s.team == team.name}
-                names = Names(space(namespace), space(parts["supervisor"].namespace))
-                observer = Observer(names, team.robots[0], team.object)
+                owner = next(k for k in _OWNERS if k in parts)
+                names = Names(space(namespace), space(parts[owner].namespace))
+                observer = Observer(names, team.robots, team.object)
                 nodes.append(observer)
                 self.teams[team.name] = _team_run(made, parts, observer)
             nodes.extend(extra() if extra else [])
@@ -124,6 +128,10 @@ class LockstepRun:
         first = next(iter(self.teams.values()))
         self.controller, self.planner = first.controller, first.planner
         self.supervisor, self.observer = first.supervisor, first.observer
+        kinds = [s.kind for s in specs]
+        owned = [len(s.robots) for s in specs if s.kind == "group"]
+        self._commanded = kinds.count("supervisor") + sum(owned)
+        self._listeners = 2 * kinds.count("supervisor") + kinds.count("group")
         self.spinner = Spinner(nodes)
 
     def __enter__(self) -> "LockstepRun":
@@ -146,8 +154,8 @@ class LockstepRun:
         def connected() -> bool:
             return (
                 all(t.supervisor.ready and t.planner.ready for t in teams)
-                and len(self.bridge.commanded()) == len(teams)
-                and bool(self.bridge.heard_by(2 * len(teams)))
+                and len(self.bridge.commanded()) == self._commanded
+                and bool(self.bridge.heard_by(self._listeners))
                 and all(t.observer.connected for t in teams)
             )
 
@@ -221,7 +229,6 @@ class LockstepRun:
 def _team_run(
     made: Mapping[str, Any], parts: Mapping[str, NodeSpec], observer: Observer
 ) -> TeamRun:
-    controller, planner, supervisor = (
-        made[parts[k].name] for k in ("controller", "planner", "supervisor")
-    )
+    kinds = ("group", "optimizer", "group") if "group" in parts else _ROLES
+    controller, planner, supervisor = (made[parts[k].name] for k in kinds)
     return TeamRun(controller, planner, supervisor, observer)

@@ -91,6 +91,10 @@ class GroupWorld:
         for name in robots:
             self._world.kill(name)
 
+    def move(self, by: Array) -> None:
+        """Somebody takes the object and puts it down elsewhere, by ``(3,)``."""
+        self._world.place(OBJECT, self._world.poses()[OBJECT] + by)
+
     def felt(self) -> tuple[Array, bool]:
         """Mean forces ``(n,)`` [N] of the robots on the object since the last call, and whether
         robots touched each other, or anything touched a wall."""

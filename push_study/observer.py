@@ -1,5 +1,6 @@
 """Watches a run from ground truth, for evaluation only."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -34,9 +35,11 @@ class Trace:
 class Observer(Node):
     """Watches a run from ground truth. For evaluation only: it commands nothing but the goal."""
 
-    def __init__(self, names: Names, robot: str, item: str) -> None:
+    def __init__(self, names: Names, robots: Sequence[str], item: str) -> None:
+        """robots: of the team; what is kept of one robot is of the first."""
         super().__init__("observer", namespace=names.team_space.rstrip("/"))
-        self._robot, self._item = robot, item
+        robot = robots[0]
+        self._robot, self._item, self._team = robot, item, frozenset(robots)
         self.trace = Trace()
         self.state: JobState | None = None
         self._touching = False
@@ -79,12 +82,12 @@ class Observer(Node):
             t.object.append(poses[self._item])
 
     def _on_contacts(self, message: Contacts) -> None:
-        pair = {self._robot, self._item}
+        ours = {*self._team, self._item}
         touching = False
         for bodies in map(set, zip(message.body_a, message.body_b, strict=True)):
-            if bodies == pair:
+            if self._item in bodies and bodies & self._team:
                 touching = True
-            elif bodies & pair:
+            elif bodies & ours:
                 self.trace.collisions += 1
         pushing = self.state is not None and self.state.state == JobState.PUSHING
         if not pushing:

@@ -59,7 +59,9 @@ def imported(path):
 
 def is_shell(path):
     """Whether a file may know ROS: the node of a package, and how it talks to other nodes."""
-    return path.name in ("node.py", "torque_node.py", "peers.py")
+    return path.name in ("node.py", "torque_node.py", "optimizer_node.py", "peers.py") or (
+        path.name.endswith("_messages.py")
+    )
 
 
 FILES = sources()

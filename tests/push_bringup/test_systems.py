@@ -10,7 +10,7 @@ from push_bringup.node_settings import SECTIONS, check_settings, resolved
 from push_bringup.preparation import check_bag, prepare
 from push_bringup.systems import LIVE, MODULES, nodes_of, single, teams_of
 from push_model.settings import SettingsError
-from push_scenario.scenario import load_scenario, scenario_from_text
+from push_scenario.scenario import load_scenario, scenario_from_mapping, scenario_from_text
 
 
 def parameters(words):
@@ -183,3 +183,55 @@ def test_the_system_torque_has_a_controller_for_each_robot_driven_by_torques():
     for wrong in ({"nmpc": {"friction": -1.0}}, {"mpc": {"horizon": 3}}):
         with pytest.raises(SettingsError):
             prepare("wheel-slip", system="torque", parameters={"torque_controller": wrong})
+
+
+def group_values(**changes):
+    values = {
+        "environment": "open",
+        "robots": {
+            f"e{i}": {"type": "epuck_ring", "start": [-1.0, 0.3 * i, 0.0]} for i in range(3)
+        },
+        "objects": {"plate": {"type": "plate_hexagon", "start": [0.0, 0.0, 0.0]}},
+    }
+    return scenario_from_mapping({**values, **changes}, "several", "several")
+
+
+def test_a_group_has_an_optimizer_and_one_node_for_all_its_robots():
+    nodes = nodes_of("group", group_values(), "lab")
+    assert [n.kind for n in nodes] == ["bridge", "optimizer", "group"]
+    assert nodes[2].robots == ("e0", "e1", "e2") and nodes[2].item == "plate"
+    assert 'robots:=["e0", "e1", "e2"]' in nodes[2].words("s")
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({"robots": {"a": {"type": "epuck_ring", "start": [-1, 0, 0]}}}, "takes 2 to 5"),
+        ({"objects": {}}, "no object to push"),
+        (
+            {
+                "robots": {
+                    "a": {"type": "epuck_ring", "start": [-1, 0, 0]},
+                    "b": {"type": "epuck", "start": [-1, 0.5, 0]},
+                }
+            },
+            "robots of several types",
+        ),
+        (
+            {
+                "robots": {
+                    name: {"type": "epuck", "start": [-1, y, 0]}
+                    for name, y in (("a", -0.4), ("b", 0.4))
+                }
+            },
+            "without a ring bumper",
+        ),
+        (
+            {"objects": {"plate": {"type": "swarm_flower", "start": [0.3, 0, 0]}}},
+            "not convex",
+        ),
+    ],
+)
+def test_what_is_no_group_is_refused_with_the_reason(changes, why):
+    with pytest.raises(SettingsError, match=why):
+        nodes_of("group", group_values(**changes))

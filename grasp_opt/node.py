@@ -1,0 +1,381 @@
+"""The group's node: goals and trajectories in, velocities of all its robots out.
+
+Every frame of the pose stream is answered with one message on ``cmd_vels``; the steps come from the
+grasp optimizer.
+"""
+
+import sys
+import time
+from typing import Any
+
+import numpy as np
+from nav_msgs.msg import OccupancyGrid
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from std_msgs.msg import Header
+
+from grasp_opt.free_space import FreeSpace, Obstacles
+from grasp_opt.group_control import GroupControlSettings
+from grasp_opt.group_job import GroupJob, GroupJobSettings, Request
+from grasp_opt.group_messages import plan_from_ros, status_to_ros, trajectory_from_ros
+from grasp_opt.group_push import GroupPushSettings
+from grasp_opt.moves import MoveSettings
+from grasp_opt.object_trajectory import ObjectTrajectory
+from grasp_opt.object_way import WayFinder
+from push_estimation.pose_gate import PoseGateSettings, Stamp
+from push_model import se2
+from push_model.arrays import Array
+from push_model.jobs import GoalRefused, JobError, JobPhase
+from push_model.occupancy import OccupancyGrid as Grid
+from push_msgs.action import MoveObject, PlanGroupPush, PushAlong
+from push_msgs.msg import GroupStatus, Velocities
+from push_ros.actions import GoalClient, GoalServer
+from push_ros.conversions import circles_to_ros, grid_from_ros, pose_stamped_to_ros, pose_to_ros
+from push_ros.diagnostics import Diagnostics
+from push_ros.job_intake import JobIntake
+from push_ros.names import names_of
+from push_ros.parameters import declare_settings
+from push_ros.pose_feed import Frame, PoseFeed
+from push_ros.process import run_node
+from push_ros.qos import COMMAND, LATCHED, STATUS
+from push_ros.validation import InvalidMessage
+from push_scenario.scenario import Scenario, load_scenario
+
+_PATIENCE = 10.0  # [s] wall time for the optimizer to be there, and for poses
+_ERRORS = {
+    PlanGroupPush.Result.INVALID_GOAL: JobError.INVALID_GOAL,
+    PlanGroupPush.Result.UNKNOWN_OBJECT: JobError.UNKNOWN_OBJECT,
+    PlanGroupPush.Result.TOO_FEW: JobError.TOO_HEAVY,
+}
+
+
+class GroupNode(Node):
+    """Robots of one type, one object, one job at a time."""
+
+    def __init__(
+        self,
+        scenario: Scenario | None = None,
+        robots: tuple[str, ...] = (),
+        item: str = "",
+        namespace: str = "",
+        world: str = "",
+    ) -> None:
+        """robots, item: the group's. namespace: the team's; world: the bridge's, where it is
+        another one."""
+        super().__init__("group", namespace=namespace)
+        self.names = names = names_of(self, world)
+        name = self.declare_parameter("scenario", "group-ellipse").value
+        scenario = scenario or load_scenario(str(name))
+        given = self.declare_parameter("robots", list(robots) or [""]).value
+        self.robots = tuple(r for r in given if r) or tuple(scenario.robots)
+        item = str(self.declare_parameter("object", item).value)
+        _, self._robot = scenario.robot(self.robots[0])
+        self.object, self._item = scenario.object(item)
+        values = dict(scenario.parameters.get("group", {}))
+        sections = {k: values.pop(k, {}) for k in ("push", "control", "moves", "poses")}
+        self.job = GroupJob(
+            self._item,
+            self._robot,
+            len(self.robots),
+            declare_settings(self, GroupJobSettings, values, where="group"),
+            declare_settings(self, GroupPushSettings, sections["push"], "push", "group.push"),
+            declare_settings(
+                self, GroupControlSettings, sections["control"], "control", "group.control"
+            ),
+            declare_settings(self, MoveSettings, sections["moves"], "moves", "group.moves"),
+        )
+        gate = declare_settings(self, PoseGateSettings, sections["poses"], "poses", "group.poses")
+        self._others = {
+            k: r for k, r in scenario.radii.items() if k not in (*self.robots, self.object)
+        }
+        self._grid: Grid | None = None
+        self._finder: WayFinder | None = None
+        self._asked: Request | None = None
+        self._waiting = time.monotonic()
+        self._told: tuple[JobPhase, str, int] | None = None
+        self._stamp = Header().stamp
+        self._pose = np.zeros(3)
+        self._diagnostics = Diagnostics(self, names, self._state)
+        self._commands = self.create_publisher(Velocities, names.world("cmd_vels"), COMMAND)
+        self._status = self.create_publisher(GroupStatus, names.team("group_status"), STATUS)
+        self._optimizer = GoalClient(self, PlanGroupPush, names.team("plan_group_push"))
+        self._poses = PoseFeed(
+            self,
+            names,
+            gate,
+            [*self.robots, self.object, *self._others],
+            self._diagnostics,
+            self._on_frame,
+        )
+        self._intake = JobIntake(
+            self, names, self._diagnostics, self, "group", list(self.robots), self.object
+        )
+        self._along = GoalServer(
+            self,
+            PushAlong,
+            names.team("push_along"),
+            check=lambda request: None,
+            refuse=self._refuse_trajectory,
+            start=self._begin_along,
+            cancel=lambda: self.end_job(JobError.CANCELED, "canceled"),
+            preempt=lambda request: self.end_job(JobError.PREEMPTED, "a trajectory replaces it"),
+        )
+        self.create_subscription(
+            OccupancyGrid,
+            names.world("map"),
+            self._on_map,
+            LATCHED,
+            event_callbacks=self._diagnostics.subscription_events(names.world("map")),
+        )
+        self._watchdog = self.create_timer(
+            0.1, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
+        self._publish_state()
+
+    @property
+    def ready(self) -> bool:
+        """Whether a goal could be worked on."""
+        return self._grid is not None and self._optimizer.ready
+
+    # The owner of the job, see JobOwner
+
+    @property
+    def busy(self) -> bool:
+        """See JobOwner."""
+        return self.job.busy
+
+    @property
+    def plan_ready(self) -> bool:
+        """A group plans a step at a time: there is no plan that waits."""
+        return False
+
+    def check_goal(self, goal: Array) -> None:
+        """See JobOwner."""
+        if self._grid is None or self._finder is None:
+            return
+        if not self._grid.contains(float(goal[0]), float(goal[1])):
+            raise GoalRefused(JobError.OUTSIDE_MAP, "the goal is outside the map")
+        room = self._finder.clearance(self._item.mass_pose(goal), Obstacles())[0]
+        if room <= 0.0:
+            raise GoalRefused(JobError.GOAL_OCCUPIED, "the object does not fit there")
+
+    def take_goal(self, goal: Array, plan_only: bool) -> None:
+        """See JobOwner."""
+        self.job.begin(self._item.mass_pose(goal))
+        if plan_only:
+            self.end_job(JobError.INVALID_GOAL, "a group plans a step at a time; it cannot wait")
+        self._begun()
+
+    def end_job(self, code: JobError, message: str) -> None:
+        """See JobOwner."""
+        self.job.end(code, message)
+        self._optimizer.forget()
+        self._look_after_job()
+
+    def execute(self) -> None:
+        """See JobOwner; there is never a plan that waits."""
+
+    # Trajectories
+
+    def _refuse_trajectory(self, request: Any) -> Any:
+        """The result for a trajectory that cannot be; None where it can."""
+        try:
+            task = trajectory_from_ros(request, self._item)
+        except InvalidMessage as error:
+            return PushAlong.Result(error_code=int(JobError.INVALID_GOAL), error_msg=str(error))
+        off = se2.between(task.pose[0], self._pose)
+        away, turned = float(np.hypot(off[0], off[1])), abs(float(off[2]))
+        s = self.job.settings
+        if away > 4.0 * s.position_tolerance or turned > 4.0 * s.orientation_tolerance:
+            text = f"the object is {1e3 * away:.0f} mm, {turned:.2f} rad from where it begins"
+            return PushAlong.Result(error_code=int(JobError.INVALID_GOAL), error_msg=text)
+        return None
+
+    def _begin_along(self, request: Any) -> None:
+        self.job.begin_along(trajectory_from_ros(request, self._item))
+        self._begun()
+
+    def _begun(self) -> None:
+        self._waiting = time.monotonic()
+        self._look_after_job()
+
+    # The world
+
+    def _on_map(self, message: OccupancyGrid) -> None:
+        try:
+            grid = grid_from_ros(message)
+        except InvalidMessage as error:
+            self._diagnostics.refuse("/map", str(error))
+            return
+        if self._grid is None or not self._grid.equals(grid):
+            self._grid = grid
+            self._finder = WayFinder(FreeSpace(grid), self._item.geometry.outline, 0.0)
+
+    def _on_frame(self, frame: Frame) -> None:
+        self._stamp = frame.stamp
+        twists = np.zeros((len(self.robots), 2))
+        if frame.verdict is Stamp.RESET:
+            self.job.revive()
+            self.end_job(JobError.CLOCK_RESET, "the clock went back")
+        elif frame.verdict is not Stamp.REFUSED:
+            twists = self._tick()
+        self._publish(twists)
+        self._look_after_job()
+
+    def _tick(self) -> Array:
+        """Twists ``(n, 2)`` of all robots; they stand while a pose is not known."""
+        item = self._poses.pose(self.object)
+        robots = [self._poses.pose(name) for name in self.robots]
+        if item is None or any(r is None for r in robots):
+            return np.zeros((len(self.robots), 2))
+        self._waiting = time.monotonic()
+        self._pose = self._item.mass_pose(item)
+        began = time.thread_time()
+        twists = self.job.step(self._poses.stamp, self._pose, np.array(robots))
+        step, plan = self.job.last, self.job.plan
+        if step is not None and plan is not None:
+            away, turned = self._errors(plan.trajectory, step.time)
+            figures = {
+                "friction": self._item.contact_friction,
+                "margin": float(plan.placement.margin),
+                "position_error": away,
+                "orientation_error": turned,
+                "solve_time": time.thread_time() - began,
+            }
+            pushers = [self.robots[i] for i in plan.pushers]
+            dead = [self.robots[i] for i in self.job.dead]
+            self._status.publish(
+                status_to_ros(self._stamp, self.object, pushers, step, self._pose, figures, dead)
+            )
+        return twists
+
+    def _errors(self, task: ObjectTrajectory, when: float) -> tuple[float, float]:
+        off = se2.between(task.sample(when), self._pose)
+        return float(np.hypot(off[0], off[1])), abs(float(off[2]))
+
+    def _publish(self, twists: Array) -> None:
+        message = Velocities(
+            names=list(self.robots), vx=twists[:, 0].tolist(), omega=twists[:, 1].tolist()
+        )
+        message.header.stamp, message.header.frame_id = self._stamp, "base_link"
+        self._commands.publish(message)
+
+    def _on_watchdog(self) -> None:
+        """Wall time, for when nothing comes."""
+        if not self.job.busy or self._poses.paused:
+            self._waiting = time.monotonic()
+            return
+        if time.monotonic() - self._waiting > _PATIENCE:
+            if self._asked is not None and not self._optimizer.ready:
+                self.end_job(JobError.NODE_LOST, "the grasp optimizer is not there")
+            elif self._poses.silence > 1.0 or self._poses.pose(self.object) is None:
+                self.end_job(JobError.POSES_STALE, "poses of the object or a robot do not come")
+
+    # The optimizer
+
+    def _look_after_job(self) -> None:
+        """Ask for the step that the job wants, tell how it stands, end what has ended."""
+        request = self.job.request
+        if request is None:
+            self._asked = None
+        elif request is not self._asked and self._optimizer.ready:
+            self._asked = request
+            self._ask(request)
+        state = (self.job.state, self.job.reason, self.job.pushes)
+        if state == self._told:
+            return
+        ended = self._told is not None and self._told[0] is not JobPhase.IDLE
+        self._told = state
+        self._publish_state()
+        if ended and not self.job.busy:
+            self._finish()
+
+    def _ask(self, request: Request) -> None:
+        goal = PlanGroupPush.Goal(object=self.object, robots=list(self.robots))
+        goal.start = pose_to_ros(self._item.geometric_pose(request.pose))
+        goal.goal = pose_stamped_to_ros(self._item.geometric_pose(request.goal), self._poses.stamp)
+        goal.places = [pose_to_ros(pose) for pose in request.robots]
+        goal.dead = [self.robots[i] for i in request.dead]
+        bodies = {name: self._poses.pose(name) for name in self._others}
+        circles = [[*p[:2], self._others[n]] for n, p in bodies.items() if p is not None]
+        goal.obstacles = circles_to_ros(np.array(circles).reshape(-1, 3))
+        if request.trajectory is not None:
+            task = request.trajectory
+            poses = np.array([self._item.geometric_pose(p) for p in task.pose])
+            goal.time, goal.theta = task.time.tolist(), task.pose[:, 2].tolist()
+            goal.x, goal.y = poses[:, 0].tolist(), poses[:, 1].tolist()
+
+        def answered(result: Any) -> None:
+            if self.job.request is not request:
+                return
+            if result is None:
+                self.job.failed(JobError.PLANNING_FAILED, "the optimizer rejected the request")
+            elif result.error_code:
+                code = _ERRORS.get(result.error_code, JobError.PLANNING_FAILED)
+                self.job.failed(code, result.error_msg)
+            else:
+                try:
+                    self.job.planned(plan_from_ros(result.plan, self.robots))
+                except InvalidMessage as error:
+                    self.job.failed(JobError.PLANNING_FAILED, str(error))
+            self._look_after_job()
+
+        self._optimizer.send(goal, answered)
+
+    # Outputs
+
+    def _publish_state(self) -> None:
+        job = self.job
+        pieces = job.pushes + max(0, job.left - (job.state is JobPhase.PUSHING))
+        self._intake.publish(
+            self._poses.stamp,
+            state=int(job.state),
+            state_name=job.state.name,
+            reason=job.reason,
+            error_code=int(job.error),
+            progress=float(not job.busy) if not pieces else min(1.0, job.pushes / pieces),
+            step_index=max(0, job.pushes - 1),
+            step_count=pieces,
+            replans=job.replans,
+        )
+        self.get_logger().info(f"{job.state.name}: {job.reason}")
+
+    def _finish(self) -> None:
+        """Tell whoever waits how the job ended."""
+        job, away, turned = self.job, float("inf"), float("inf")
+        if job.goal is not None:
+            off = se2.between(job.goal, self._pose)
+            away, turned = float(np.hypot(off[0], off[1])), abs(float(off[2]))
+        common = {
+            "error_code": int(job.error),
+            "error_msg": "" if job.error is JobError.NONE else job.reason,
+            "position_error": away,
+            "orientation_error": turned,
+        }
+        if self._along.active:
+            margin = job.plan.placement.margin if job.plan is not None else -1.0
+            result = PushAlong.Result(margin=float(margin), **common)
+            self._along.finish(result, success=job.error is JobError.NONE)
+        if self._intake.waited_for:
+            self._intake.finish(MoveObject.Result(pushes=job.pushes, replans=job.replans, **common))
+
+    def _state(self) -> dict[str, Any]:
+        return {
+            "state": self.job.state.name,
+            "reason": self.job.reason,
+            "error code": int(self.job.error),
+            "pushes": self.job.pushes,
+            "replans": self.job.replans,
+            "robots that do not move": " ".join(self.robots[i] for i in self.job.dead),
+            "poses refused": self._poses.gate.refused,
+            "warning": "no poses" if self._poses.pose(self.object) is None else "",
+        }
+
+
+def main() -> int:
+    """Entry point of the process: ``--ros-args`` on its command line."""
+    return run_node(GroupNode)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
