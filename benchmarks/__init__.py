@@ -8,6 +8,7 @@ from typing import Any
 NAMES = (
     "curve",
     "grasp",
+    "group",
     "mpc",
     "nmpc",
     "placement",

@@ -77,7 +77,8 @@ class GroupJob:
         self.last: GroupStep | None = None
         self._failures = 0
         self._revived = False
-        self._along: ObjectTrajectory | None = None
+        self._along: ObjectTrajectory | None = None  # what is left of the one that was given
+        self._following = False
         self._push: GroupPush | None = None
         self._mover: Mover | None = None
         self._watch: Obedience | None = None
@@ -93,12 +94,14 @@ class GroupJob:
         self.goal, self.error = goal, JobError.NONE
         self.pushes = self.replans = self._failures = self.left = 0
         self.plan, self._along, self._revived = None, None, False
+        self._following = False
         self._enter(JobPhase.DETACHING, "robots come away from the object")
 
     def begin_along(self, trajectory: ObjectTrajectory) -> None:
-        """Take a trajectory of the centre of mass instead: one push, and no other."""
+        """Take a trajectory of the centre of mass instead: one push, or several where the robots
+        must change places on it."""
         self.begin(trajectory.pose[-1])
-        self._along = trajectory
+        self._along, self._following = trajectory, True
 
     def end(self, code: JobError, message: str) -> None:
         """End the job under way."""
@@ -171,7 +174,7 @@ class GroupJob:
             )
         self._failures += 1
         self.replans += 1
-        if self._failures > self.settings.failures or (self._along and self.pushes):
+        if self._failures > self.settings.failures or (self._following and self.pushes):
             self.end(JobError.EXECUTION_FAILED, reason)
             return
         self._enter(JobPhase.DETACHING, reason)
@@ -198,7 +201,7 @@ class GroupJob:
         if away <= s.position_tolerance and turned <= s.orientation_tolerance:
             self.end(JobError.NONE, f"at the goal: {1e3 * away:.1f} mm, {turned:.3f} rad")
             return
-        if self.pushes >= (1 if self._along else s.steps):
+        if self.pushes >= s.steps or (self._following and self._along is None):
             text = f"{1e3 * away:.1f} mm and {turned:.3f} rad off after {self.pushes} pushes"
             self.end(JobError.OFF_TARGET, text)
             return
@@ -244,6 +247,9 @@ class GroupJob:
         elif step.phase is Phase.DONE:
             self._failures = 0
             self.left = max(0, self.left - 1)
+            if self._along is not None:
+                begin, end = self.plan.trajectory.duration, self._along.duration
+                self._along = self._along.between(begin, end) if self.left else None
             self._since = now
             self._enter(JobPhase.DETACHING, "the piece is done")
         elif step.phase is Phase.FAILED:

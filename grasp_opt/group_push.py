@@ -26,6 +26,8 @@ from push_model.arrays import Array
 from push_model.settings import bounded, settings
 from push_model.specs import ObjectSpec, RobotSpec
 
+_GAP = 0.2  # [s] between ticks from which on they are no longer one after the other
+
 
 @settings
 class GroupPushSettings:
@@ -82,6 +84,8 @@ class Obedience:
     def step(self, time: float, robots: Array, speeds: Array) -> tuple[int, ...]:
         """Indices of the disobedient; robots ``(n, 3)`` poses, speeds ``(n,)`` [m/s] that they are
         told from now on."""
+        if self._seen and time - self._seen[-1][0] > _GAP:
+            self._seen.clear()
         if self._seen:
             before, _, told, _ = self._seen[-1]
             self._told = self._told + told * (time - before)
@@ -147,6 +151,11 @@ class GroupPush:
         if self._begin is None:
             self._begin = self._last = self._moved_on = now
         tick, self._last = now - self._last, now
+        if tick > _GAP:  # nobody saw anything for a while: what was known of motion is old
+            self._filter.reset()
+            self._begin += tick
+            self._moved_on += tick
+            tick = 0.0
         self._filter.update(now, pose)
         estimate = self._filter.pose
         searching = self._contact_since is None or now - self._contact_since < s.steady

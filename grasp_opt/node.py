@@ -91,7 +91,7 @@ class GroupNode(Node):
         self._grid: Grid | None = None
         self._finder: WayFinder | None = None
         self._asked: Request | None = None
-        self._waiting = time.monotonic()
+        self._waiting = self._wanted = time.monotonic()
         self._told: tuple[JobPhase, str, int] | None = None
         self._stamp = Header().stamp
         self._pose = np.zeros(3)
@@ -196,7 +196,7 @@ class GroupNode(Node):
         self._begun()
 
     def _begun(self) -> None:
-        self._waiting = time.monotonic()
+        self._waiting = self._wanted = time.monotonic()
         self._look_after_job()
 
     # The world
@@ -261,15 +261,21 @@ class GroupNode(Node):
         self._commands.publish(message)
 
     def _on_watchdog(self) -> None:
-        """Wall time, for when nothing comes."""
+        """Wall time, for when nothing comes: no poses, or no answer."""
+        now = time.monotonic()
         if not self.job.busy or self._poses.paused:
-            self._waiting = time.monotonic()
+            self._waiting = self._wanted = now
             return
-        if time.monotonic() - self._waiting > _PATIENCE:
-            if self._asked is not None and not self._optimizer.ready:
-                self.end_job(JobError.NODE_LOST, "the grasp optimizer is not there")
-            elif self._poses.silence > 1.0 or self._poses.pose(self.object) is None:
-                self.end_job(JobError.POSES_STALE, "poses of the object or a robot do not come")
+        if self.job.request is None or self._optimizer.ready:
+            self._wanted = now
+        else:  # gone, perhaps to come again: it is asked anew then
+            self._asked = None
+            self._optimizer.forget()
+        if now - self._wanted > _PATIENCE:
+            self.end_job(JobError.NODE_LOST, "the grasp optimizer is not there")
+        elif now - self._waiting > _PATIENCE:
+            self.end_job(JobError.POSES_STALE, "poses of the object or a robot do not come")
+        self._look_after_job()
 
     # The optimizer
 

@@ -43,6 +43,14 @@ class ObjectTrajectory:
         x, y, omega = self.twist.T
         return np.column_stack([c * x + s * y, -s * x + c * y, omega])
 
+    def between(self, begin: float, end: float) -> "ObjectTrajectory":
+        """The part from one time [s] to another, its time from 0."""
+        inner = self.time[(self.time > begin + 1e-9) & (self.time < end - 1e-9)]
+        time = np.concatenate([[begin], inner, [end]])
+        pose = np.array([self.sample(t) for t in time])
+        twist = np.array([self.twist_at(t) for t in time])
+        return ObjectTrajectory(time - begin, pose, twist)
+
     def sample(self, t: float) -> Array:
         """Pose ``(3,)`` at a time [s]; at rest beyond the ends."""
         return np.array([np.interp(t, self.time, column) for column in self.pose.T])

@@ -37,6 +37,7 @@ _DETOURS = 5  # of which the shortest is taken
 _ESCAPES = 12  # motions that are tried when there is none
 _SURE = 0.05  # of margin with which a detour must be held
 _SEED = 1
+_PARTS = (1.0, 0.75, 0.5, 0.35, 0.25, 0.15, 0.08)  # of a trajectory that no placement holds whole
 
 
 @settings
@@ -156,7 +157,10 @@ class StepPlanner:
         dead: tuple[int, ...],
         others: Array,
     ) -> GroupPlan:
-        """Places and moves for one push along a trajectory that somebody gives; see ``plan``.
+        """Places and moves for a push along a trajectory that somebody gives; see ``plan``.
+
+        Where no placement holds all of it, it is of the first part that one holds: there the
+        robots change places, and ``left`` is 2.
 
         Raises
         ------
@@ -172,7 +176,17 @@ class StepPlanner:
         if room.min() < self.settings.clearance:
             k = int(np.argmin(room))
             raise NoStep(f"the object is too close to something {times[k]:.1f} s along its way")
-        return self._push(pose, trajectory, poses, self._weights, robots, alive, still, 1)
+        why: Exception = NoStep("it has no length")
+        for part in _PARTS:
+            end = part * trajectory.duration
+            task = trajectory if part == 1.0 else trajectory.between(0.0, end)
+            left = 1 if part == 1.0 else 2
+            way = poses[times <= end + 1e-9]
+            try:
+                return self._push(pose, task, way, self._weights, robots, alive, still, left)
+            except NoStep as error:
+                why = error if part == 1.0 else why
+        raise why
 
     def _still(self, robots: Array, dead: tuple[int, ...], others: Array) -> Array:
         """``(k, 3)`` discs that stand in the way for ever."""

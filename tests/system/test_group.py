@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rclpy.action import ActionClient
 
-from grasp_opt.object_trajectory import polynomial, screw
+from grasp_opt.object_trajectory import polynomial, sampled, screw
 from push_model.jobs import JobError
 from push_msgs.action import PushAlong
 from push_msgs.msg import GroupStatus, JobState
@@ -101,6 +101,18 @@ def test_a_trajectory_is_followed_and_one_that_begins_elsewhere_refused(run):
     assert away < 5e-3 and turned < 0.03
     again = along(run, bend)
     assert again.error_code == JobError.INVALID_GOAL and "from where it begins" in again.error_msg
+
+
+def test_on_a_trajectory_that_no_placement_holds_the_robots_change_places(run):
+    """Ahead, and then aside with the same heading: nobody can push both ways at once."""
+    first = screw(np.array([0.0, 0.0, -1.5708]), np.array([0.0, 0.4, 0.0]), 0.05, 0.05, 0.2)
+    second = screw(first.pose[-1], np.array([0.4, 0.0, 0.0]), 0.05, 0.05, 0.2)
+    time = np.concatenate([first.time, first.duration + second.time[1:]])
+    pose = np.vstack([first.pose, second.pose[1:]])
+    result = along(run, sampled(time, pose))
+    assert result.error_code == 0, result.error_msg
+    assert run.supervisor.job.pushes >= 2
+    assert error(run, pose[-1])[0] < 5e-3
 
 
 def test_what_cannot_be_held_is_refused_before_anybody_moves():

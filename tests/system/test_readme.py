@@ -40,14 +40,24 @@ def names(cell):
     return {n.replace("<robot>", ROBOT) for n in re.findall(r"`([^`]+)`", cell)}
 
 
+GROUP_NODES = {"group": ("group", "/"), "optimizer": ("optimizer", "/")}
+
+
 @pytest.fixture(scope="module")
 def graph():
     """Of every node: topics that it hears, topics that it tells, what it serves, what it asks."""
-    with own_domain(), LockstepRun(load_scenario("short"), quiet=True) as run:
+    return {
+        **look(load_scenario("short"), "single", NODES),
+        **look(load_scenario("group-ellipse"), "group", GROUP_NODES),
+    }
+
+
+def look(scenario, system, nodes):
+    with own_domain(), LockstepRun(scenario, system=system, quiet=True) as run:
         run.start()
         found = {}
         me = run.observer
-        for row, (name, space) in NODES.items():
+        for row, (name, space) in nodes.items():
             heard = {t for t, _ in me.get_subscriber_names_and_types_by_node(name, space)}
             told = {t for t, _ in me.get_publisher_names_and_types_by_node(name, space)}
             served = {t for t, _ in me.get_service_names_and_types_by_node(name, space)}
@@ -67,14 +77,14 @@ def graph():
                 {s for s in asked if "/_action/" not in s} | goals,
             )
             assert "/diagnostics" in told, row
-        yield found
+        return found
 
 
 def test_every_node_has_a_row_and_no_other():
-    assert {row[0] for row in table("node")[:4]} == set(NODES)
+    assert {row[0] for row in table("node")[:6]} == {*NODES, *GROUP_NODES}
 
 
-@pytest.mark.parametrize("node", NODES)
+@pytest.mark.parametrize("node", [*NODES, *GROUP_NODES])
 def test_what_a_node_hears_tells_serves_and_asks(graph, node):
     (row,) = [r for r in table("node") if r[0] == node]
     for cell, actual in zip(row[1:], graph[node], strict=True):
@@ -82,6 +92,9 @@ def test_what_a_node_hears_tells_serves_and_asks(graph, node):
 
 
 def test_settings_and_their_defaults_exist():
+    from grasp_opt.group_control import GroupControlSettings
+    from grasp_opt.group_job import GroupJobSettings
+    from grasp_opt.step_planner import StepSettings
     from push_mpc.settings import ControllerSettings, MpcSettings, TrackerSettings
     from push_planner import PlannerSettings
     from push_supervisor import SupervisorSettings
@@ -95,6 +108,8 @@ def test_settings_and_their_defaults_exist():
             {"mpc": MpcSettings(), "tracker": TrackerSettings()},
         ),
         "supervisor": (SupervisorSettings(), {}),
+        "group": (GroupJobSettings(), {"control": GroupControlSettings()}),
+        "optimizer": (StepSettings(), {}),
     }
     lines = (ROOT / "README.md").read_text().splitlines()
     start = next(i for i, line in enumerate(lines) if line.startswith("| node | parameter |"))
@@ -113,4 +128,4 @@ def test_settings_and_their_defaults_exist():
                 scale = 1e-3 if "mm" in default else 1.0
                 assert value == pytest.approx(float(number.group()) * scale), full
             checked += 1
-    assert checked >= 12
+    assert checked >= 16
