@@ -36,13 +36,14 @@ class GroupJobSettings:
 @dataclass(frozen=True)
 class Request:
     """What the next step is to be planned for; poses of the centre of mass. trajectory: that is to
-    be followed, where one was given instead of a goal."""
+    be followed, where one was given instead of a goal. fewest: robots that are to push at least."""
 
     pose: Array
     goal: Array
     robots: Array
     dead: tuple[int, ...]
     trajectory: ObjectTrajectory | None = None
+    fewest: int = 0
 
 
 class GroupJob:
@@ -79,6 +80,7 @@ class GroupJob:
         self._revived = False
         self._along: ObjectTrajectory | None = None  # what is left of the one that was given
         self._following = False
+        self._fewest = 0  # robots that are to push at least: fewer have failed
         self._push: GroupPush | None = None
         self._mover: Mover | None = None
         self._watch: Obedience | None = None
@@ -94,7 +96,7 @@ class GroupJob:
         self.goal, self.error = goal, JobError.NONE
         self.pushes = self.replans = self._failures = self.left = 0
         self.plan, self._along, self._revived = None, None, False
-        self._following = False
+        self._following, self._fewest = False, 0
         self._enter(JobPhase.DETACHING, "robots come away from the object")
 
     def begin_along(self, trajectory: ObjectTrajectory) -> None:
@@ -206,7 +208,9 @@ class GroupJob:
             self.end(JobError.OFF_TARGET, text)
             return
         self._enter(JobPhase.PLANNING, "planning the next step")
-        self.request = Request(pose.copy(), self.goal, robots.copy(), self.dead, self._along)
+        self.request = Request(
+            pose.copy(), self.goal, robots.copy(), self.dead, self._along, self._fewest
+        )
 
     def _go(self, now: float, pose: Array, robots: Array) -> Array:
         assert self._mover is not None and self.plan is not None
@@ -254,5 +258,7 @@ class GroupJob:
             self._enter(JobPhase.DETACHING, "the piece is done")
         elif step.phase is Phase.FAILED:
             self._since = now
-            self._lost(tuple(pushers[i] for i in step.dead), step.reason)
+            # Who was only held fast moves when it backs off; who does not is dead.
+            self._fewest = len(pushers) + 1
+            self._lost((), step.reason)
         return twists

@@ -301,6 +301,7 @@ class GroupNode(Node):
         goal.start = pose_to_ros(self._item.geometric_pose(request.pose))
         goal.goal = pose_stamped_to_ros(self._item.geometric_pose(request.goal), self._poses.stamp)
         goal.places = [pose_to_ros(pose) for pose in request.robots]
+        goal.fewest = request.fewest
         goal.dead = [self.robots[i] for i in request.dead]
         bodies = {name: self._poses.pose(name) for name in self._others}
         circles = [[*p[:2], self._others[n]] for n, p in bodies.items() if p is not None]

@@ -157,9 +157,9 @@ class OptimizerNode(Node):
         others = circles_from_ros(request.obstacles)
         if len(request.time):
             task = trajectory_from_ros(request, self._item)
-            return self._planner.along(task, pose, robots, dead, others)
+            return self._planner.along(task, pose, robots, dead, others, request.fewest)
         goal = self._item.mass_pose(stamped_pose(request.goal, "the goal"))
-        return self._planner.plan(pose, goal, robots, dead, others)
+        return self._planner.plan(pose, goal, robots, dead, others, request.fewest)
 
     def _fail(self, code: int, message: str) -> None:
         self.failures += 1

@@ -46,6 +46,7 @@ class StepSettings:
 
     room: float = bounded(0.03, low=0.0, high=1.0, doc="[m] about the object beside a robot's size")
     clearance: float = bounded(0.01, low=0.0, high=1.0, doc="[m] of robots from everything")
+    gap: float = bounded(0.015, low=0.0, high=1.0, doc="[m] between robots that push a piece")
     standoff: float = bounded(0.012, low=1e-3, high=0.5, doc="[m] from a place to where it is met")
     back: float = bounded(0.05, low=0.0, high=1.0, doc="[m] straight on at the end of a way there")
     speed: float = bounded(0.05, low=1e-3, high=5.0, doc="[m/s] of the object's farthest point")
@@ -91,7 +92,7 @@ class StepPlanner:
         to a goal have fewer steps."""
         self.settings = s = settings or StepSettings()
         self._weights = placement or PlacementSettings()
-        self._placement = replace(self._weights, steps=s.steps)
+        self._placement = replace(self._weights, steps=s.steps, gap=s.gap)
         self._space, self._item, self._robot = FreeSpace(grid), item, robot
         self._outline = ContactOutline(item.geometry)
         self._shape = item.geometry.outline
@@ -100,6 +101,7 @@ class StepPlanner:
         self._finders = [WayFinder(self._space, self._shape, part * room) for part in _ROOMS]
         self._reach = float(np.hypot(*self._shape.T).max())
         self._known: dict[int, list[Array]] = {}  # by the number of robots
+        self._fewest = 0  # of the plan under way
 
     @property
     def force(self) -> float:
@@ -113,7 +115,13 @@ class StepPlanner:
             raise NoStep("the object does not fit there")
 
     def plan(
-        self, pose: Array, goal: Array, robots: Array, dead: tuple[int, ...], others: Array
+        self,
+        pose: Array,
+        goal: Array,
+        robots: Array,
+        dead: tuple[int, ...],
+        others: Array,
+        fewest: int = 0,
     ) -> GroupPlan:
         """The next step towards a goal.
 
@@ -121,12 +129,14 @@ class StepPlanner:
         ----------
         pose, goal ``(3,)``: of the centre of mass. robots ``(n, 3)``: all of them; dead: indices of
             those that stand for ever. others ``(k, 3)``: x, y, radius [m] of further bodies.
+            fewest: robots that push at least, as far as there are so many.
 
         Raises
         ------
         NoStep
         """
         alive = [i for i in range(len(robots)) if i not in dead]
+        self._fewest = fewest
         still = self._still(robots, dead, others)
         why: Exception = NoStep("there is no way for the object")
         for finder in self._finders:
@@ -156,6 +166,7 @@ class StepPlanner:
         robots: Array,
         dead: tuple[int, ...],
         others: Array,
+        fewest: int = 0,
     ) -> GroupPlan:
         """Places and moves for a push along a trajectory that somebody gives; see ``plan``.
 
@@ -167,6 +178,7 @@ class StepPlanner:
         NoStep: also when the object does not keep clear of everything on it.
         """
         alive = [i for i in range(len(robots)) if i not in dead]
+        self._fewest = fewest
         still = self._still(robots, dead, others)
         reach = self._reach + self._radius
         count = max(2, math.ceil((trajectory.length + _turned(trajectory) * reach) / _LOOKED_AT))
@@ -298,20 +310,29 @@ class StepPlanner:
                 f"{self.force:.2f} N have {self.force * len(alive):.2f} N"
             )
         why: Exception = NoStep("no robots")
-        fewest = math.ceil(needed / self.force)
-        for count in range(fewest, min(_MOST, len(alive)) + 1):
+        most, least = min(_MOST, len(alive)), math.ceil(needed / self.force)
+        fewest = min(most, max(self._fewest, least))
+        doubtful: list[Placement] = []
+        for count in (*range(fewest, most + 1), *range(fewest - 1, least - 1, -1)):
             try:
                 placement = robust_placement(
                     self._item, trajectory, count, self._radius, self.force, weights, free
                 )
-                if placement.margin < s.margin - 1e-9 and count < min(_MOST, len(alive)):
-                    why = NoStep("too little margin")
+                if placement.margin < s.margin - 1e-9:
+                    doubtful.append(placement)
                     continue
                 return self._with_moves(
                     pose, placement, trajectory, poses, robots, alive, still, left
                 )
             except NoPlacement as error:
                 why = NoStep(str(error))
+            except NoStep as error:
+                why = error
+        for placement in sorted(doubtful, key=lambda p: -p.margin):
+            try:
+                return self._with_moves(
+                    pose, placement, trajectory, poses, robots, alive, still, left
+                )
             except NoStep as error:
                 why = error
         raise NoStep(str(why))

@@ -207,7 +207,16 @@ def answer(job: GroupJob, planner: StepPlanner) -> None:
         return
     others = np.zeros((0, 3))
     try:
-        job.planned(planner.plan(request.pose, request.goal, request.robots, request.dead, others))
+        job.planned(
+            planner.plan(
+                request.pose,
+                request.goal,
+                request.robots,
+                request.dead,
+                others,
+                request.fewest,
+            )
+        )
     except TooFew as error:
         job.failed(JobError.TOO_HEAVY, str(error))
     except NoStep as error:

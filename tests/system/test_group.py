@@ -105,8 +105,8 @@ def test_a_trajectory_is_followed_and_one_that_begins_elsewhere_refused(run):
 
 def test_on_a_trajectory_that_no_placement_holds_the_robots_change_places(run):
     """Ahead, and then aside with the same heading: nobody can push both ways at once."""
-    first = screw(np.array([0.0, 0.0, -1.5708]), np.array([0.0, 0.4, 0.0]), 0.05, 0.05, 0.2)
-    second = screw(first.pose[-1], np.array([0.4, 0.0, 0.0]), 0.05, 0.05, 0.2)
+    first = screw(np.array([0.0, 0.0, -1.5708]), np.array([0.0, 0.25, 0.0]), 0.05, 0.05, 0.2)
+    second = screw(first.pose[-1], np.array([0.25, 0.0, 0.0]), 0.05, 0.05, 0.2)
     time = np.concatenate([first.time, first.duration + second.time[1:]])
     pose = np.vstack([first.pose, second.pose[1:]])
     result = along(run, sampled(time, pose))
