@@ -13,6 +13,7 @@ from scipy.optimize import linear_sum_assignment
 from grasp_opt.free_space import FreeSpace, Obstacles
 from push_model.arrays import Array, Mask
 
+_SLANT = 0.25  # cosine between normal and way, of the most slanting robot
 _BACKS = (1.0, 0.6, 0.3)  # of the way back from a place, where there is less room behind it
 LEAST_BACK = _BACKS[-1]
 """The least of them."""
@@ -30,6 +31,14 @@ class Move:
     robot: int
     points: Array
     heading: float | None
+
+
+def standoffs(normals: Array, ahead: Array, away: float) -> Array:
+    """``(n, 1)`` [m] before their places at which robots stop: so far [m] from the object, however
+    slanting they come to it, by directions ``(n, 2)`` ahead and normals of the contacts."""
+    slant = np.clip((normals * ahead).sum(axis=1), _SLANT, 1.0)
+    back: Array = away / slant[:, None]
+    return back
 
 
 class Marshal:

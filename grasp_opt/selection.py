@@ -113,10 +113,11 @@ class GraspSelector:
         radius: float,
         criterion: Literal["mhd", "energy"] = "mhd",
         least_margin: float = 0.0,
+        gap: float = 0.0,
     ) -> None:
-        """least_margin: what the compatibility test must have to spare."""
+        """least_margin: what the compatibility test must have to spare. gap: [m] between robots."""
         self.item, self.trajectory, self.count, self.radius = item, trajectory, count, radius
-        self.criterion, self.least_margin = criterion, least_margin
+        self.criterion, self.least_margin, self._gap = criterion, least_margin, gap
         self.outline = ContactOutline(item.geometry)
         self._surface = item.limit_surface()
         self._twists = trajectory.body_twists
@@ -134,7 +135,7 @@ class GraspSelector:
         if self.outline.from_corner(way).min() < _CORNER:
             return False
         contacts = self.outline.at(way)
-        if not (apart(contacts, self.radius) and behind(contacts, self._first)):
+        if not (apart(contacts, self.radius, self._gap) and behind(contacts, self._first)):
             return False
         return self.margin(contacts) >= self.least_margin - HELD
 
@@ -168,6 +169,21 @@ class GraspSelector:
         value, way = self._refined(way, first)
         contacts = self.outline.at(way)
         return Selection(way, contacts, first, value, self.margin(contacts), tries, len(good))
+
+    def first(self, tries: int, seed: int) -> Selection:
+        """The first of so many random grasps that meets the requirements, as it is.
+
+        Raises
+        ------
+        NoGraspFound: none of them does.
+        """
+        random = np.random.default_rng(seed)
+        for k in range(tries):
+            way = random_ways(self.outline, self.count, self.radius, self._first, random)
+            if self.meets(way):
+                value, contacts = self.value(way), self.outline.at(way)
+                return Selection(way, contacts, value, value, self.margin(contacts), k + 1, 1)
+        raise NoGraspFound(f"none of {tries} random grasps of {self.count} robots passes the test")
 
     def _refined(self, way: Array, value: float) -> tuple[float, Array]:
         """(3.9)-(3.10) from there, by a compass search."""

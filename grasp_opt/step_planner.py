@@ -11,7 +11,7 @@ import numpy as np
 from grasp_opt.contact_outline import ContactOutline
 from grasp_opt.free_space import FreeSpace, Obstacles
 from grasp_opt.group_control import rigid
-from grasp_opt.marshal import LEAST_BACK, Marshal, Move, NoStep
+from grasp_opt.marshal import LEAST_BACK, Marshal, Move, NoStep, standoffs
 from grasp_opt.object_trajectory import ObjectTrajectory, screw, screw_between, screw_poses
 from grasp_opt.object_way import NoObjectWay, WayFinder, pieces
 from grasp_opt.placement import (
@@ -200,6 +200,22 @@ class StepPlanner:
                 why = error if part == 1.0 else why
         raise why
 
+    def taking(
+        self, way: Array, trajectory: ObjectTrajectory, pose: Array, robots: Array
+    ) -> GroupPlan:
+        """Moves to places ``(n,)`` [m] along the outline that somebody has chosen, for a push along
+        a trajectory; nobody is dead.
+
+        Raises
+        ------
+        NoStep: robots do not get there.
+        """
+        placer = Placer(self._item, trajectory, len(way), self._radius, self._weights)
+        ends = np.array([trajectory.pose[0], trajectory.pose[-1]])
+        nobody, everybody = np.zeros((0, 3)), list(range(len(robots)))
+        placed = placer.placement(way)
+        return self._with_moves(pose, placed, trajectory, ends, robots, everybody, nobody, 1)
+
     def _still(self, robots: Array, dead: tuple[int, ...], others: Array) -> Array:
         """``(k, 3)`` discs that stand in the way for ever."""
         standing = [[*robots[i, :2], self._radius] for i in dead]
@@ -297,7 +313,8 @@ class StepPlanner:
             centres = contacts.centres(self._radius)
             ahead = rigid(twist, centres)
             ahead /= np.maximum(1e-9, np.hypot(*ahead.T))[:, None]
-            met = se2.transform(pose, centres - (s.standoff + LEAST_BACK * s.back) * ahead)
+            off = standoffs(contacts.normals, ahead, s.standoff) + LEAST_BACK * s.back
+            met = se2.transform(pose, centres - off * ahead)
             points = np.vstack([met, *(se2.transform(p, centres) for p in poses)])
             room = self._space.room(points, walls).reshape(len(poses) + 1, -1)
             enough: Mask = np.all(room >= self._radius + 0.5 * s.clearance, axis=0)
@@ -351,7 +368,8 @@ class StepPlanner:
         s, centres = self.settings, placement.contacts.centres(self._radius)
         ahead = rigid(_first_twist(trajectory), centres)
         ahead /= np.hypot(*ahead.T)[:, None]
-        met = se2.transform(pose, centres - s.standoff * ahead)
+        normals = placement.contacts.normals
+        met = se2.transform(pose, centres - standoffs(normals, ahead, s.standoff) * ahead)
         headings = pose[2] + np.arctan2(ahead[:, 1], ahead[:, 0])
         places = np.column_stack([met, headings])
         outline = se2.transform(pose, self._shape)

@@ -130,7 +130,7 @@ def problem(task: GoalTask) -> Problem:
             finder.way(start, goal, Obstacles())
         except NoObjectWay:
             continue
-        robots = _robots(random, task.robots, space, se2.transform(start, outline), radius)
+        robots = scattered(random, task.robots, space, se2.transform(start, outline), radius, SIZE)
         return Problem(environment, item, start, goal, robots)
     raise RuntimeError("no problem could be drawn")
 
@@ -144,13 +144,19 @@ def _environment(random: np.random.Generator, obstacles: bool) -> EnvironmentSpe
     return from_mapping(EnvironmentSpec, values, "environment")
 
 
-def _robots(
-    random: np.random.Generator, count: int, space: FreeSpace, outline: Array, radius: float
+def scattered(
+    random: np.random.Generator,
+    count: int,
+    space: FreeSpace,
+    outline: Array,
+    radius: float,
+    size: tuple[float, float],
 ) -> Array:
-    """Anywhere in the room, not nearer than 3 cm to anything."""
+    """Poses ``(n, 3)`` of robots anywhere in a room about the origin, not nearer than 3 cm to
+    anything."""
     placed: list[Array] = []
     while len(placed) < count:
-        pose = np.append(random.uniform(-0.5, 0.5, 2) * SIZE, random.uniform(-math.pi, math.pi))
+        pose = np.append(random.uniform(-0.5, 0.5, 2) * size, random.uniform(-math.pi, math.pi))
         discs = np.array([[p[0], p[1], radius] for p in placed]).reshape(-1, 3)
         if space.room(pose[None, :2], Obstacles((outline,), discs))[0] > radius + 0.03:
             placed.append(pose)

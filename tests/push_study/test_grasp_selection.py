@@ -1,0 +1,46 @@
+"""The study of selected grasps: a slice of it in the planar world."""
+
+import numpy as np
+import pytest
+
+from push_model.settings import SettingsError
+from push_scenario.bodies import load_robot
+from push_study.experiments import grasp_selection
+from push_study.experiments.grasp_selection import SelectionTask
+from push_study.study import StudyOptions
+
+
+def task(grasp, trajectory="polynomial-2", scenario="plate_hexagon"):
+    return SelectionTask(scenario, 1, "", trajectory, grasp, "planar", "mild")
+
+
+def test_the_selected_grasp_is_better_by_its_criterion_and_both_meet_the_requirements():
+    for trajectory in ("polynomial-1", "sinusoid-2"):
+        best = grasp_selection.choose(task("selected", trajectory))
+        some = grasp_selection.choose(task("random", trajectory))
+        assert best.value > some.value and min(best.margin, some.margin) >= 0.02 - 1e-9
+        for chosen in (best, some):
+            centres = chosen.contacts.centres(load_robot("epuck_ring").footprint_radius)
+            away = np.hypot(*(centres[:, None] - centres[None]).transpose(2, 0, 1))
+            assert away[np.triu_indices(3, 1)].min() >= 0.115 - 1e-9
+
+
+def test_robots_take_the_grasp_and_push_to_the_end():
+    row = grasp_selection.trial(task("selected"))
+    assert row["success"], row["reason"]
+    assert row["collision_ticks"] == 0 and row["position_error_m"] < 5e-3
+    assert row["final_position_error_m"] < 0.01
+
+
+def test_a_grasp_that_there_is_not_is_told_and_the_table_counts_it(tmp_path, capsys):
+    missing = grasp_selection.trial(task("random", "sinusoid-1", "plate_square"))
+    assert not missing["success"] and "passes the test" in missing["reason"]
+    options = StudyOptions(("plate_square",), 1, 1, tmp_path, world="planar")
+    assert len(grasp_selection.tasks(options)) == 12
+    grasp_selection.conclude(options, [], [missing])
+    assert "random     0 of 1" in capsys.readouterr().out
+
+
+def test_only_convex_objects_are_taken(tmp_path):
+    with pytest.raises(SettingsError, match="not convex"):
+        grasp_selection.tasks(StudyOptions(("swarm_flower",), 1, 1, tmp_path))
