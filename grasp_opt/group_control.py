@@ -11,6 +11,7 @@ turns rolls along the object, by the ring's radius times the turn. Robots that a
 drag the object aside, so they are only led back slowly.
 """
 
+import itertools
 import math
 from dataclasses import dataclass
 from typing import Literal
@@ -55,6 +56,8 @@ class GroupControlSettings:
     correction: float = bounded(
         2.0, low=1.0, high=10.0, doc="times the task's own speed that corrections may ask for"
     )
+    apart: float = bounded(8e-3, low=0.0, high=1.0, doc="[m] between robots; nearer, they part")
+    apart_gain: float = bounded(0.5, low=0.0, high=100.0, doc="[1/s] of what is lacking of it")
     lead: float = bounded(0.025, low=1e-3, high=1.0, doc="[m] of the controlled point ahead")
 
 
@@ -172,8 +175,25 @@ class GroupController:
             moved = rigid(self._feasible(made, task), local)
             moved += off_place - (off_place * normals).sum(axis=1)[:, None] * normals
             moved += self._inward(gaps, forces, normals, touching)[:, None] * normals
+        self._keep_apart(moved, local)
         world = se2.rotation_matrix(float(pose[2]))
         return GroupCommand(wrench, forces, lacking, gaps, contacts, moved @ world.T)
+
+    def _keep_apart(self, moved: Array, local: Array) -> None:
+        """Let robots at ``local (n, 2)`` that come too close to each other part again, by changing
+        their velocities ``moved (n, 2)``."""
+        s = self.settings
+        for i, j in itertools.combinations(range(len(local)), 2):
+            between = local[j] - local[i]
+            away = float(np.hypot(*between))
+            lacking = 2.0 * self._radius + s.apart - away
+            if lacking <= 0.0 or away == 0.0:
+                continue
+            unit = between / away
+            short = s.apart_gain * lacking - float((moved[j] - moved[i]) @ unit)
+            if short > 0.0:
+                moved[i] -= 0.5 * short * unit
+                moved[j] += 0.5 * short * unit
 
     def _inward(self, gaps: Array, forces: Array, normals: Array, touching: Mask) -> Array:
         """``(n,)`` [m/s] towards the object: what is away comes, who is to carry more goes ahead.

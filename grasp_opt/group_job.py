@@ -160,10 +160,11 @@ class GroupJob:
     def _obeyed(self, now: float, robots: Array, twists: Array) -> bool:
         """Whether all do as they are told; else the step is planned anew without who does not."""
         assert self._watch is not None
-        told = self._watch.step(now, robots, twists[:, 0])
+        told = self._watch.step(now, robots, twists)
         late = now - self._since > self.settings.moving
         if not told and not late:
             return True
+        self._since = now
         self._lost(told, "robots take too long to their places" if late else "")
         return False
 

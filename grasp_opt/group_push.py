@@ -26,6 +26,7 @@ from push_model.arrays import Array
 from push_model.settings import bounded, settings
 from push_model.specs import ObjectSpec, RobotSpec
 
+_LEVER = 0.03  # [m] at which turns count as ways
 _GAP = 0.2  # [s] between ticks from which on they are no longer one after the other
 
 
@@ -81,22 +82,24 @@ class Obedience:
         self._seen: deque[tuple[float, Array, Array, Array]] = deque()
         self._told = np.zeros(count)  # [m] so far
 
-    def step(self, time: float, robots: Array, speeds: Array) -> tuple[int, ...]:
-        """Indices of the disobedient; robots ``(n, 3)`` poses, speeds ``(n,)`` [m/s] that they are
-        told from now on."""
+    def step(self, time: float, robots: Array, twists: Array) -> tuple[int, ...]:
+        """Indices of the disobedient; robots ``(n, 3)`` poses, twists ``(n, 2)`` v [m/s], omega
+        [rad/s] that they are told from now on. Turns count as ways at a lever."""
         if self._seen and time - self._seen[-1][0] > _GAP:
             self._seen.clear()
         if self._seen:
             before, _, told, _ = self._seen[-1]
             self._told = self._told + told * (time - before)
-        self._seen.append((time, np.array(robots[:, :2]), np.abs(speeds), self._told))
+        speeds = np.abs(twists[:, 0]) + _LEVER * np.abs(twists[:, 1])
+        self._seen.append((time, np.array(robots), speeds, self._told))
         while time - self._seen[0][0] > self._patience:
             self._seen.popleft()
-        first, places, _, sums = self._seen[0]
+        first, poses, _, sums = self._seen[0]
         if time - first < 0.9 * self._patience:
             return ()
         told = self._told - sums
-        gone = np.hypot(*(robots[:, :2] - places).T)
+        turned = np.remainder(robots[:, 2] - poses[:, 2] + math.pi, 2.0 * math.pi) - math.pi
+        gone = np.hypot(*(robots[:, :2] - poses[:, :2]).T) + _LEVER * np.abs(turned)
         return tuple(int(i) for i in np.flatnonzero((told > self._way) & (gone < 0.1 * told)))
 
 
@@ -214,7 +217,7 @@ class GroupPush:
         """Why the push cannot go on, or nothing; and which robots are to blame."""
         s = self.settings
         assert self._begin is not None
-        dead = self._obedience.step(now, robots, twists[:, 0])
+        dead = self._obedience.step(now, robots, twists)
         if dead and len(dead) < len(robots):
             return f"{_count(dead)} not move although told to", dead
         away, turned = self._errors(pose)

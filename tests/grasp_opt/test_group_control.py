@@ -146,3 +146,18 @@ def test_robots_come_to_the_object_the_way_that_they_will_push():
     speeds = np.hypot(*local.T)
     assert local == pytest.approx(speeds[:, None] * ahead, abs=1e-9)
     assert (speeds > 0.005).all() and (speeds <= group.settings.approach + 1e-9).all()
+
+
+def test_robots_that_come_too_close_part_again_and_others_do_not_care():
+    group = controller((math.pi - 0.3, math.pi, math.pi + 0.9))
+    twist = np.array([0.05, 0.0, 0.0])
+    robots = group.places.copy()
+    unit = (robots[1] - robots[0]) / np.hypot(*(robots[1] - robots[0]))
+    robots[0] = robots[1] - 0.103 * unit
+    still = np.zeros(3)
+    near = group.command(still, twist, still, twist, robots).velocities
+    free = controller((math.pi - 0.3, math.pi, math.pi + 0.9), apart=0.0)
+    alone = free.command(still, twist, still, twist, robots).velocities
+    assert (near[1] - near[0]) @ unit >= 0.5 * 0.005 - 1e-9
+    assert near[2] == pytest.approx(alone[2], abs=1e-12)
+    assert near[0] + near[1] == pytest.approx(alone[0] + alone[1], abs=1e-12)

@@ -76,6 +76,16 @@ def test_all_but_one_dead_is_told_as_too_little_force(world):
     assert np.hypot(*world.truth()[0][:2]) < 0.02
 
 
+def test_a_dead_robot_that_would_have_to_turn_first_is_found_out(world):
+    """On its way to a place, far from the object: it is left, and another one goes."""
+    run = Run(world)
+    world.kill(world.names[1:2])
+    run.job.begin(np.array([0.0, 0.8, 0.0]))
+    assert run.until(lambda: not run.job.busy)
+    assert run.job.error is JobError.NONE and world.time < 120.0
+    assert run.job.dead in ((), (1,))
+
+
 def test_an_end_stops_all_robots_and_the_next_job_goes_on_from_there(world):
     run = Run(world)
     run.job.begin(np.array([0.0, 0.8, 0.0]))

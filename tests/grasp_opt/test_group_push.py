@@ -73,7 +73,7 @@ def test_an_object_that_is_too_heavy_ends_the_push():
 def test_obedience_tells_who_stands_from_who_waits_and_who_goes():
     random = np.random.default_rng(1)
     watch = Obedience(3, 1.0, 0.01)
-    told = np.array([0.05, 0.05, 0.0])
+    told = np.array([[0.05, 0.0], [0.05, 0.0], [0.0, 0.0]])
     for k in range(120):
         t = k * TICK
         poses = np.zeros((3, 3))
@@ -84,3 +84,13 @@ def test_obedience_tells_who_stands_from_who_waits_and_who_goes():
             assert watch.step(t, poses, told) == (1,)
         if t < 0.8:
             assert watch.step(t, poses, told) == ()
+
+
+def test_obedience_tells_who_does_not_turn():
+    watch = Obedience(2, 1.0, 0.01)
+    told = np.array([[0.0, 0.8], [0.0, 0.8]])
+    for k in range(80):
+        t = k * TICK
+        poses = np.array([[0.0, 0.0, 3.0 + 0.8 * t], [0.0, 0.0, 1.0]])
+        answer = watch.step(t, poses, told)
+    assert answer == (1,)
