@@ -129,8 +129,7 @@ class GroupPush:
             robot.footprint_radius,
             control,
         )
-        moving = int(np.argmax(np.linalg.norm(trajectory.body_twists, axis=1) > 0.0))
-        self.ahead = self.controller.ahead(trajectory.body_twists[moving])
+        self.ahead = self.controller.ahead(trajectory.first_twist)
         self._filter = VelocityFilter(
             s.position_noise, s.orientation_noise, s.acceleration, s.turning
         )

@@ -43,6 +43,13 @@ class ObjectTrajectory:
         x, y, omega = self.twist.T
         return np.column_stack([c * x + s * y, -s * x + c * y, omega])
 
+    @property
+    def first_twist(self) -> Array:
+        """``(3,)`` in the object's frame, as it begins to move."""
+        twists = self.body_twists
+        first: Array = twists[int(np.argmax(np.linalg.norm(twists, axis=1) > 0.0))]
+        return first
+
     def between(self, begin: float, end: float) -> "ObjectTrajectory":
         """The part from one time [s] to another, its time from 0."""
         inner = self.time[(self.time > begin + 1e-9) & (self.time < end - 1e-9)]

@@ -109,11 +109,6 @@ class StepPlanner:
         lift = lift_share(self._robot, self._item)
         return self.settings.force_share * standing_traction(self._robot, lift)
 
-    def check_goal(self, goal: Array) -> None:
-        """Raise NoStep for a pose ``(3,)`` of the centre of mass where the object has no room."""
-        if float(self._finders[0].clearance(goal, Obstacles())[0]) <= self.settings.clearance:
-            raise NoStep("the object does not fit there")
-
     def plan(
         self,
         pose: Array,
@@ -137,6 +132,7 @@ class StepPlanner:
         """
         alive = [i for i in range(len(robots)) if i not in dead]
         self._fewest = fewest
+        self._least(len(alive))
         still = self._still(robots, dead, others)
         why: Exception = NoStep("there is no way for the object")
         for finder in self._finders:
@@ -179,6 +175,7 @@ class StepPlanner:
         """
         alive = [i for i in range(len(robots)) if i not in dead]
         self._fewest = fewest
+        self._least(len(alive))
         still = self._still(robots, dead, others)
         reach = self._reach + self._radius
         count = max(2, math.ceil((trajectory.length + _turned(trajectory) * reach) / _LOOKED_AT))
@@ -215,6 +212,16 @@ class StepPlanner:
         nobody, everybody = np.zeros((0, 3)), list(range(len(robots)))
         placed = placer.placement(way)
         return self._with_moves(pose, placed, trajectory, ends, robots, everybody, nobody, 1)
+
+    def _least(self, alive: int) -> int:
+        """How many robots have the force together; raises TooFew where so many alive have not."""
+        needed = push_force(self._item)
+        if needed > self.force * min(alive, _MOST):
+            raise TooFew(
+                f"the object needs {needed:.2f} N, {alive} robots of "
+                f"{self.force:.2f} N have {self.force * alive:.2f} N"
+            )
+        return math.ceil(needed / self.force)
 
     def _still(self, robots: Array, dead: tuple[int, ...], others: Array) -> Array:
         """``(k, 3)`` discs that stand in the way for ever."""
@@ -305,7 +312,7 @@ class StepPlanner:
         left: int,
     ) -> GroupPlan:
         """The fewest robots that hold a trajectory well enough, with their places and moves."""
-        s, twist = self.settings, _first_twist(trajectory)
+        s, twist = self.settings, trajectory.first_twist
         walls = Obstacles(discs=still)
 
         def free(way: Array) -> Mask:
@@ -320,14 +327,8 @@ class StepPlanner:
             enough: Mask = np.all(room >= self._radius + 0.5 * s.clearance, axis=0)
             return enough
 
-        needed = push_force(self._item)
-        if needed > self.force * min(len(alive), _MOST):
-            raise TooFew(
-                f"the object needs {needed:.2f} N, {len(alive)} robots of "
-                f"{self.force:.2f} N have {self.force * len(alive):.2f} N"
-            )
         why: Exception = NoStep("no robots")
-        most, least = min(_MOST, len(alive)), math.ceil(needed / self.force)
+        most, least = min(_MOST, len(alive)), self._least(len(alive))
         fewest = min(most, max(self._fewest, least))
         doubtful: list[Placement] = []
         for count in (*range(fewest, most + 1), *range(fewest - 1, least - 1, -1)):
@@ -366,7 +367,7 @@ class StepPlanner:
         left: int,
     ) -> GroupPlan:
         s, centres = self.settings, placement.contacts.centres(self._radius)
-        ahead = rigid(_first_twist(trajectory), centres)
+        ahead = rigid(trajectory.first_twist, centres)
         ahead /= np.hypot(*ahead.T)[:, None]
         normals = placement.contacts.normals
         met = se2.transform(pose, centres - standoffs(normals, ahead, s.standoff) * ahead)
@@ -380,13 +381,6 @@ class StepPlanner:
         marshal.clear(pushers, [se2.transform(p, self._shape) for p in poses], swept)
         marshal.send(pushers, places)
         return GroupPlan(pushers, placement, trajectory, marshal.batches(), left)
-
-
-def _first_twist(trajectory: ObjectTrajectory) -> Array:
-    """``(3,)`` in the object's frame, as it begins to move."""
-    moving = np.linalg.norm(trajectory.body_twists, axis=1) > 0.0
-    first: Array = trajectory.body_twists[int(np.argmax(moving))]
-    return first
 
 
 def _turned(trajectory: ObjectTrajectory) -> float:
