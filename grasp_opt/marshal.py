@@ -89,14 +89,24 @@ class Marshal:
         return np.array(place[:2]) - back * np.array([math.cos(place[2]), math.sin(place[2])])
 
     def clear(self, pushers: tuple[int, ...], outlines: list[Array], swept: Array) -> None:
-        """Send those who do not push out of the way of object and pushers, if they are in it."""
+        """Send those who do not push out of the way of object and pushers, if they are in it.
+
+        Raises
+        ------
+        NoStep: one would be run over, and has nowhere to go.
+        """
         for robot in self._alive:
             if robot in pushers:
                 continue
             here = self._at[robot][None]
             if self._out_of_the_way(here, outlines, swept)[0]:
                 continue
-            self._park(robot, outlines, swept)
+            if self._park(robot, outlines, swept):
+                continue
+            away = self._space.room(here, Obstacles(tuple(outlines)))[0]
+            others = np.hypot(*(swept - here).T).min()
+            if away < self._need or others < self._need + self._radius:
+                raise NoStep("a robot that does not push stands in the way and cannot leave")
 
     def _out_of_the_way(self, points: Array, outlines: list[Array], swept: Array) -> Mask:
         away = self._space.room(points, Obstacles(tuple(outlines)))

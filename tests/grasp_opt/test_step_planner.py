@@ -5,12 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from grasp_opt.marshal import NoStep
+from grasp_opt.free_space import FreeSpace, Obstacles
+from grasp_opt.marshal import Marshal, NoStep
 from grasp_opt.moves import Mover, MoveSettings, back_off
 from grasp_opt.object_trajectory import screw
 from grasp_opt.step_planner import StepPlanner, StepSettings, TooFew
 from push_model import se2
-from push_model.occupancy import rasterise
+from push_model.occupancy import OccupancyGrid, rasterise
 from push_model.outlines import distance, inside
 from push_model.specs import EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
@@ -130,3 +131,21 @@ def test_backing_off_ends_where_there_is_room_and_never_runs_into_others():
     assert twists[2, 0] == settings.back_speed, "its back is to the object: ahead is away"
     free = back_off(robots[[0, 2]], gaps[[0, 2]], ahead[[0, 2]], [0], 0.104, settings)
     assert free[0, 0] == -settings.back_speed and not free[1].any()
+
+
+def test_who_stands_in_the_way_and_cannot_leave_is_not_run_over():
+    """In a cell of its own; beside it the object passes, or goes through."""
+    occupied = np.zeros((150, 200), dtype=bool)
+    occupied[60:90, 80:120] = True
+    occupied[65:85, 85:115] = False  # 60 cm by 40 cm, walled
+    space = FreeSpace(OccupancyGrid(occupied, 0.02, np.array([-2.0, -1.5])))
+    outline = plate(6).geometry.outline
+    for middle, passes in ((0.0, False), (0.27, True), (1.5, True)):
+        marshal = Marshal(space, RADIUS, 0.01, 0.05, Obstacles(), np.zeros((1, 3)), [0])
+        moved = [outline + [0.0, middle]]
+        if passes:
+            marshal.clear((), moved, np.array([[1.0, 1.0]]))
+            assert marshal.batches() == ()
+        else:
+            with pytest.raises(NoStep, match="stands in the way and cannot leave"):
+                marshal.clear((), moved, np.array([[1.0, 1.0]]))
