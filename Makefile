@@ -10,7 +10,8 @@ export OPENBLAS_NUM_THREADS = 1
 export ROS_AUTOMATIC_DISCOVERY_RANGE = LOCALHOST
 
 CORES = tests/push_model tests/push_scenario tests/push_estimation tests/push_planner tests/push_mpc \
-  tests/push_supervisor tests/push_bringup tests/planar_push tests/push_record
+  tests/push_supervisor tests/push_bringup tests/planar_push tests/push_record \
+  tests/grasp_opt tests/swarm_push
 
 .PHONY: install demo test test-fast coverage lint clean
 install: $(STAMP)
