@@ -24,7 +24,6 @@ from push_model import se2
 from push_model.arrays import Array, Mask
 from push_model.coulomb import cone_edges
 from push_model.grasp import grasp_matrix
-from push_model.kinematics import DifferentialDrive
 from push_model.limit_surface import EllipsoidLimitSurface
 from push_model.settings import bounded, settings
 
@@ -225,16 +224,6 @@ def rigid(twist: Array, points: Array) -> Array:
     """Velocities ``(n, 2)`` [m/s] of points ``(n, 2)`` [m] of a body that moves with a twist, all
     in its frame."""
     return np.column_stack([twist[0] - twist[2] * points[:, 1], twist[1] + twist[2] * points[:, 0]])
-
-
-def wheels_command(
-    velocity: Array, heading: float, drive: DifferentialDrive, lead: float
-) -> tuple[float, float]:
-    """Input/output linearisation: v [m/s], omega [rad/s] by which a point ``lead`` [m] ahead of the
-    axle moves at a velocity ``(2,)`` (world), as far as the wheels can; in the same direction."""
-    c, s = math.cos(heading), math.sin(heading)
-    v, omega = c * velocity[0] + s * velocity[1], (-s * velocity[0] + c * velocity[1]) / lead
-    return drive.saturate(float(v), float(omega))
 
 
 def _into(heading: float, twist: Array) -> Array:

@@ -17,7 +17,6 @@ from grasp_opt.group_control import (
     GroupCommand,
     GroupController,
     GroupControlSettings,
-    wheels_command,
 )
 from grasp_opt.object_trajectory import ObjectTrajectory
 from push_estimation.velocity_filter import VelocityFilter
@@ -178,12 +177,7 @@ class GroupPush:
             )
             velocities = command.velocities
         lead = self.controller.settings.lead
-        twists = np.array(
-            [
-                wheels_command(velocity, float(robot[2]), self._drive, lead)
-                for velocity, robot in zip(velocities, robots, strict=True)
-            ]
-        )
+        twists = self._drive.follow(velocities, robots[:, 2], lead)
         failure, dead = self._failure(now, estimate, robots, twists, searching)
         if failure:
             return GroupStep(Phase.FAILED, 0.0 * twists, command, self.time, failure, dead)

@@ -13,9 +13,9 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from grasp_opt.free_space import FreeSpace, Obstacles
-from grasp_opt.object_trajectory import screw_between, screw_poses
 from push_model import se2
 from push_model.arrays import Array, Mask
+from push_model.screws import screw_between, screw_poses
 
 _HEADINGS = 16
 _EVERY = 3  # places of the free space's lattice

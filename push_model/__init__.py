@@ -6,7 +6,7 @@ Pure numpy; imports nothing else of the project. SI units, radians, REP-103 axes
 from push_model import se2
 from push_model.coulomb import cone_angle, cone_edges, in_cone
 from push_model.grasp import grasp_matrix, line_contact_grasp
-from push_model.kinematics import DifferentialDrive, point_velocity_to_twist, unicycle_step
+from push_model.kinematics import DifferentialDrive, unicycle_step
 from push_model.limit_surface import (
     EllipsoidLimitSurface,
     LimitSurface,
@@ -54,7 +54,6 @@ __all__ = [
     "line",
     "line_contact_grasp",
     "lynch_mason_stable",
-    "point_velocity_to_twist",
     "polygon",
     "pushable_sides",
     "rectangle",

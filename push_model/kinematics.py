@@ -51,6 +51,29 @@ class DifferentialDrive:
         need = (abs(v) + abs(omega) * self.half_track) / self.max_speed
         return (v, omega) if need <= 1.0 else (v / need, omega / need)
 
+    def follow(self, velocities: Array, headings: Array, lead: float) -> Array:
+        """Input/output linearisation: twists ``(n, 2)`` v [m/s], omega [rad/s] of robots by which
+        points ahead of their axles move at given velocities; slower, in the same directions, where
+        wheels cannot.
+
+        Parameters
+        ----------
+        velocities: ``(n, 2)`` [m/s] of the points, world frame.
+        headings: ``(n,)`` [rad] of the robots.
+        lead: [m] of the points ahead of the axles.
+
+        Raises
+        ------
+        ValueError: lead is zero; a point on the axle cannot go sideways.
+        """
+        if lead == 0.0:
+            raise ValueError("the controlled point must not lie on the axle (lead = 0)")
+        c, s = np.cos(headings), np.sin(headings)
+        v = c * velocities[:, 0] + s * velocities[:, 1]
+        omega = (-s * velocities[:, 0] + c * velocities[:, 1]) / lead
+        need = (np.abs(v) + np.abs(omega) * self.half_track) / self.max_speed
+        return np.column_stack([v, omega]) / np.maximum(need, 1.0)[:, None]
+
 
 def unicycle_step(state: Array, v: float, omega: float, dt: float) -> Array:
     """Exact motion of a unicycle pose ``(3,)`` under a constant twist for dt [s]."""
@@ -64,20 +87,3 @@ def unicycle_step(state: Array, v: float, omega: float, dt: float) -> Array:
             wrap(theta + omega * dt),
         ]
     )
-
-
-def point_velocity_to_twist(velocity: Array, theta: float, offset: float) -> tuple[float, float]:
-    """Input/output linearisation: the twist that gives a point ahead of the axle a velocity.
-
-    Parameters
-    ----------
-    velocity: ``(2,)`` [m/s] of the point, world frame.
-    theta: [rad] heading.
-    offset: [m] of the point ahead of the axle, not zero.
-    """
-    if offset == 0.0:
-        raise ValueError("the controlled point must not lie on the axle (offset = 0)")
-    c, s = math.cos(theta), math.sin(theta)
-    along = c * velocity[0] + s * velocity[1]
-    across = -s * velocity[0] + c * velocity[1]
-    return float(along), float(across / offset)

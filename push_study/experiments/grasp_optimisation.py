@@ -128,7 +128,8 @@ def trial(task: OptimisationTask) -> Row:
     _places_file(task).parent.mkdir(parents=True, exist_ok=True)
     _places_file(task).write_text(json.dumps(places) + "\n")
     good = bool(found.cost <= (1.0 + WORSE) * grid.cost)
-    return {
+    reached = local_cost(placer, local, begin) / best - 1.0
+    row: Row = {
         "scenario": task.scenario,
         "seed": task.seed,
         "trajectory": task.trajectory,
@@ -141,12 +142,13 @@ def trial(task: OptimisationTask) -> Row:
         "margin": found.margin,
         "theta": " ".join(f"{a:.3f}" for a in placer.outline.angle_of_way(found.way)),
         "theta0_over": placer.cost(begin) / best - 1.0,
-        "local_over": local_cost(placer, local, begin) / best - 1.0,
+        "local_ends": math.isfinite(reached),
         "local_starts": len(ends),
         "local_worse": float(np.mean(ends > WORSE)),
         "lacking": float(lacking(task, found.way)[1].mean()),
         "theta0_lacking": float(lacking(task, begin)[1].mean()),
     }
+    return row | ({"local_over": reached} if math.isfinite(reached) else {})
 
 
 def _places_file(task: OptimisationTask) -> Path:
@@ -184,16 +186,17 @@ def conclude(options: StudyOptions, tasks: Sequence[OptimisationTask], rows: lis
     )
     for r in rows:
         if "cost" in r:
+            local = f"{100 * r['local_over']:12.1f}" if r["local_ends"] else "  at a corner"
             print(
                 f"{r['scenario']:17s}{r['trajectory']:14s}{r['robots']:4d}    {r['model']:15s}"
                 f"{100 * r['over_grid']:14.3f} {r['margin']:11.3f} {100 * r['theta0_over']:12.1f}"
-                f"{100 * r['local_over']:12.1f}"
+                f"{local}"
             )
     for model in MODELS:
         mine = [r for r in rows if r.get("model") == model and "cost" in r]
         if mine:
             worst = max(r["over_grid"] for r in mine)
-            missed = np.mean([r["local_over"] > WORSE for r in mine])
+            missed = np.mean([r.get("local_over", math.inf) > WORSE for r in mine])
             share = np.mean([r["local_worse"] for r in mine])
             print(
                 f"{model}: {sum(r['success'] for r in mine)} of {len(mine)} within "

@@ -12,7 +12,6 @@ from grasp_opt.group_control import (
     GroupControlSettings,
     distribute,
     rigid,
-    wheels_command,
 )
 from push_model import se2
 from push_model.coulomb import cone_edges
@@ -64,22 +63,6 @@ def test_of_a_wrench_that_cannot_be_made_it_is_the_nearest():
         A = np.vstack([G @ spread, 1e-3 * spread])
         best = lsq_linear(A, np.append(wrench, np.zeros(n)), (0.0, np.inf), tol=1e-13)
         assert mine <= 2.0 * best.cost + 1e-7
-
-
-def test_wheels_move_the_point_ahead_as_told_or_slower_in_the_same_direction():
-    random = np.random.default_rng(3)
-    drive, lead = ROBOT.differential, 0.025
-    slower = 0
-    for _ in range(500):
-        velocity, heading = random.normal(0.0, 0.06, 2), float(random.uniform(-4.0, 4.0))
-        v, omega = wheels_command(velocity, heading, drive, lead)
-        c, s = math.cos(heading), math.sin(heading)
-        moved = np.array([v * c - lead * omega * s, v * s + lead * omega * c])
-        share = float(moved @ velocity / (velocity @ velocity))
-        assert moved == pytest.approx(share * velocity, abs=1e-9) and 0.0 < share <= 1.0 + 1e-9
-        assert np.abs(drive.wheel_speeds(v, omega)).max() <= drive.max_wheel_speed + 1e-9
-        slower += share < 1.0 - 1e-9
-    assert 20 < slower < 480
 
 
 def controller(angles, **changes) -> GroupController:

@@ -10,7 +10,6 @@ from push_model import (
     along_curve,
     concatenate,
     line,
-    point_velocity_to_twist,
     rotation,
     unicycle_step,
 )
@@ -37,12 +36,22 @@ def test_unicycle_step_is_the_integral(v, omega, dt):
     assert exact[:2] == pytest.approx(state[:2], abs=1e-4)
 
 
-@given(st.floats(-3, 3), st.floats(0.02, 0.5), st.floats(-1, 1), st.floats(-1, 1))
-def test_linearisation_moves_the_point_as_asked(theta, offset, vx, vy):
-    v, omega = point_velocity_to_twist(np.array([vx, vy]), theta, offset)
-    c, s = math.cos(theta), math.sin(theta)
-    assert v * c - omega * offset * s == pytest.approx(vx, abs=1e-9)
-    assert v * s + omega * offset * c == pytest.approx(vy, abs=1e-9)
+def test_linearisation_moves_points_as_asked_or_slower_in_the_same_direction():
+    random = np.random.default_rng(3)
+    drive, lead = DifferentialDrive(0.0205, 0.0265, 6.28), 0.025
+    velocities, headings = random.normal(0.0, 0.06, (500, 2)), random.uniform(-4.0, 4.0, 500)
+    twists = drive.follow(velocities, headings, lead)
+    slower = 0
+    for (v, omega), velocity, heading in zip(twists, velocities, headings, strict=True):
+        c, s = math.cos(heading), math.sin(heading)
+        moved = np.array([v * c - lead * omega * s, v * s + lead * omega * c])
+        share = float(moved @ velocity / (velocity @ velocity))
+        assert moved == pytest.approx(share * velocity, abs=1e-9) and 0.0 < share <= 1.0 + 1e-9
+        assert np.abs(drive.wheel_speeds(v, omega)).max() <= drive.max_wheel_speed + 1e-9
+        slower += share < 1.0 - 1e-9
+    assert 20 < slower < 480
+    with pytest.raises(ValueError, match="lead"):
+        drive.follow(velocities, headings, 0.0)
 
 
 @pytest.mark.parametrize("distance", [0.5, -0.3, 0.001])

@@ -1,0 +1,35 @@
+"""Motions of a body with one constant twist, and the one that leads from pose to pose."""
+
+import math
+
+import numpy as np
+
+from push_model import se2
+from push_model.arrays import Array
+
+
+def screw_poses(start: Array, motion: Array, part: Array) -> Array:
+    """Poses ``(k, 3)`` after parts ``(k,)`` of a motion with one twist, headings continuous."""
+    angle = motion[2] * part
+    sine, rest = np.sinc(angle / math.pi), _versine(angle)
+    x = part * (sine * motion[0] - rest * motion[1])
+    y = part * (rest * motion[0] + sine * motion[1])
+    c, s = math.cos(start[2]), math.sin(start[2])
+    return np.column_stack([start[0] + c * x - s * y, start[1] + s * x + c * y, start[2] + angle])
+
+
+def screw_between(start: Array, goal: Array) -> Array:
+    """The motion ``(3,)`` in the frame at start that leads from there to a goal with one twist, by
+    the shorter turn."""
+    local = se2.between(start, goal)
+    angle = float(local[2])
+    sine, rest = float(np.sinc(angle / math.pi)), float(_versine(np.array([angle]))[0])
+    vx, vy = np.linalg.solve([[sine, -rest], [rest, sine]], local[:2])
+    return np.array([vx, vy, angle])
+
+
+def _versine(angle: Array) -> Array:
+    """(1 - cos a) / a."""
+    half = 0.5 * np.asarray(angle)
+    result: Array = np.sin(half) * np.sinc(half / math.pi)
+    return result
