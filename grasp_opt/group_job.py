@@ -11,10 +11,11 @@ import numpy as np
 
 from grasp_opt.contact_outline import ContactOutline
 from grasp_opt.group_control import GroupControlSettings
-from grasp_opt.group_push import GroupPush, GroupPushSettings, GroupStep, Obedience, Phase
+from grasp_opt.group_push import GroupPush, GroupPushSettings, GroupStep, Phase
 from grasp_opt.moves import Mover, MoveSettings, back_off
 from grasp_opt.object_trajectory import ObjectTrajectory
 from grasp_opt.step_planner import GroupPlan
+from push_estimation.obedience import Obedience
 from push_model import se2
 from push_model.arrays import Array
 from push_model.jobs import JobError, JobPhase

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from grasp_opt.free_space import FreeSpace, Obstacles
 from push_model.arrays import Array, Mask
+from push_model.free_space import FreeSpace, Obstacles
 
 _SLANT = 0.25  # cosine between normal and way, of the most slanting robot
 _BACKS = (1.0, 0.6, 0.3)  # of the way back from a place, where there is less room behind it

@@ -14,7 +14,6 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from std_msgs.msg import Header
 
-from grasp_opt.free_space import FreeSpace, Obstacles
 from grasp_opt.group_control import GroupControlSettings
 from grasp_opt.group_job import GroupJob, GroupJobSettings, Request
 from grasp_opt.group_messages import plan_from_ros, status_to_ros, trajectory_from_ros
@@ -25,6 +24,7 @@ from grasp_opt.object_way import WayFinder
 from push_estimation.pose_gate import PoseGateSettings, Stamp
 from push_model import se2
 from push_model.arrays import Array
+from push_model.free_space import FreeSpace, Obstacles
 from push_model.jobs import GoalRefused, JobError, JobPhase
 from push_model.occupancy import OccupancyGrid as Grid
 from push_msgs.action import MoveObject, PlanGroupPush, PushAlong

@@ -12,9 +12,9 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from grasp_opt.free_space import FreeSpace, Obstacles
 from push_model import se2
 from push_model.arrays import Array, Mask
+from push_model.free_space import FreeSpace, Obstacles
 from push_model.screws import screw_between, screw_poses
 
 _HEADINGS = 16

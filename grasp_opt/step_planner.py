@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_opt.contact_outline import ContactOutline
-from grasp_opt.free_space import FreeSpace, Obstacles
 from grasp_opt.group_control import rigid
 from grasp_opt.marshal import LEAST_BACK, Marshal, Move, NoStep, standoffs
 from grasp_opt.object_trajectory import ObjectTrajectory, screw
@@ -23,6 +22,7 @@ from grasp_opt.placement import (
 )
 from push_model import se2
 from push_model.arrays import Array, Mask
+from push_model.free_space import FreeSpace, Obstacles
 from push_model.occupancy import OccupancyGrid
 from push_model.screws import screw_between, screw_poses
 from push_model.settings import bounded, settings

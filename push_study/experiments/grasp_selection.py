@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_opt.free_space import FreeSpace
 from grasp_opt.group_job import GroupJob
 from grasp_opt.marshal import NoStep
 from grasp_opt.object_trajectory import study_trajectories
@@ -20,6 +19,7 @@ from grasp_opt.selection import GraspSelector, NoGraspFound, Selection
 from grasp_opt.step_planner import GroupPlan, StepPlanner
 from push_model import se2
 from push_model.arrays import Array
+from push_model.free_space import FreeSpace
 from push_model.jobs import JobError, JobPhase
 from push_model.occupancy import rasterise
 from push_model.settings import SettingsError

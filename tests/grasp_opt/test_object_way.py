@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from grasp_opt.free_space import FreeSpace, Obstacles
 from grasp_opt.object_trajectory import sampled, screw
 from grasp_opt.object_way import NoObjectWay, WayFinder, pieces
 from push_model import se2
+from push_model.free_space import FreeSpace, Obstacles
 from push_model.occupancy import OccupancyGrid, rasterise
 from push_model.screws import screw_between, screw_poses
 from push_model.specs import EnvironmentSpec

@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from grasp_opt.free_space import FreeSpace, Obstacles
 from grasp_opt.marshal import Marshal, NoStep
 from grasp_opt.moves import Mover, MoveSettings, back_off
 from grasp_opt.object_trajectory import screw
 from grasp_opt.step_planner import StepPlanner, StepSettings, TooFew
 from push_model import se2
+from push_model.free_space import FreeSpace, Obstacles
 from push_model.occupancy import OccupancyGrid, rasterise
 from push_model.outlines import distance, inside
 from push_model.specs import EnvironmentSpec

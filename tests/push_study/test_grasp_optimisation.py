@@ -27,7 +27,11 @@ def slice_(tmp_path_factory):
 def test_a_task_is_searched_as_well_as_by_a_grid_and_never_worse_than_by_the_local_method(slice_):
     _, task, row = slice_
     assert row["success"] and row["over_grid"] <= study.WORSE
-    assert row["local_starts"] == 2 and row["theta0_over"] > 0.0 and row.get("local_over", math.inf) > -1e-3
+    assert (
+        row["local_starts"] == 2
+        and row["theta0_over"] > 0.0
+        and row.get("local_over", math.inf) > -1e-3
+    )
     placer = study.placer_of(task)
     assert placer.best().cost == row["cost"] < placer.cost(study.theta0(placer))
 

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from grasp_opt.free_space import FreeSpace, Obstacles
 from push_model import se2
+from push_model.free_space import FreeSpace, Obstacles
 from push_model.occupancy import OccupancyGrid, rasterise
 from push_model.outlines import distance
 from push_model.specs import EnvironmentSpec

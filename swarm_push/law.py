@@ -1,0 +1,58 @@
+"""What every law of a swarm offers, and what the laws are called.
+
+A law sees where the object and the robots are and says how fast each robot is to go, and over which
+density the swarm spreads. It is written for robots that go in any direction.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
+
+from push_model.arrays import Array
+from swarm_push.density import Density
+
+
+class SwarmPhase(Enum):
+    """What a swarm is at."""
+
+    GATHER = "gather"
+    GO_ROUND = "go round"
+    PUSH = "push"
+    REALIGN = "realign"
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What a law sees.
+
+    time: [s]. pose ``(3,)`` of the object's centre of mass. robots ``(n, 2)`` [m]. target ``(3,)``:
+    where the centre of mass is to be, its heading nan where any will do.
+    """
+
+    time: float
+    pose: Array
+    robots: Array
+    target: Array
+
+
+@dataclass(frozen=True)
+class SwarmStep:
+    """velocities ``(n, 2)`` [m/s] of the robots; density that they cover; centroids ``(n, 2)`` [m]
+    of their cells; phase of the swarm."""
+
+    velocities: Array
+    density: Density
+    centroids: Array
+    phase: SwarmPhase
+
+
+class SwarmLaw(Protocol):
+    """Moves a swarm; may remember its last step."""
+
+    def step(self, scene: Scene) -> SwarmStep:
+        """One tick; there is at least one robot."""
+        ...
+
+    def reset(self) -> None:
+        """Forget what was."""
+        ...

@@ -1,0 +1,61 @@
+"""The printed law of chapter 4: a Gaussian that moves by the artificial potential, and coverage."""
+
+import numpy as np
+
+from push_model.arrays import Array
+from push_model.settings import bounded, settings
+from swarm_push.coverage import Coverage
+from swarm_push.density import tangential
+from swarm_push.law import Scene, SwarmPhase, SwarmStep
+from swarm_push.potential import PotentialSettings, direction_to, swarm_input
+
+
+@settings
+class ThesisLawSettings(PotentialSettings):
+    """Of section 4.3. Zero deviations follow from the number of robots, as printed."""
+
+    sigma_x: float = bounded(0.0, low=0.0, high=10.0, doc="[m] tangential to the object")
+    sigma_y: float = bounded(0.0, low=0.0, high=10.0, doc="[m] towards it")
+    lead: float = bounded(0.1, low=1e-3, high=10.0, doc="[m] dt of (4.4) times a unit of u_swarm")
+    gain: float = bounded(1.0, low=1e-3, high=100.0, doc="[1/s] of Lloyd's control")
+
+
+def printed_sigmas(count: int) -> tuple[float, float]:
+    """sigma_x, sigma_y [m] of section 4.3, by the number of robots: with few of them a more
+    elliptical density brings more of them to the object."""
+    if count <= 5:
+        return 0.075, 0.0375
+    return 0.1, 0.075 if count <= 8 else 0.1
+
+
+class ThesisLaw:
+    """(4.1)-(4.8) with the errata; all that it knows of the object is a radius [m]."""
+
+    def __init__(self, region: Array, radius: float, settings: ThesisLawSettings) -> None:
+        self.settings = settings
+        self._coverage, self._radius = Coverage(region), radius
+
+    def reset(self) -> None:
+        """See SwarmLaw; nothing is remembered."""
+
+    def step(self, scene: Scene) -> SwarmStep:
+        """See SwarmLaw."""
+        s, robots, item = self.settings, scene.robots, scene.pose[:2]
+        mean = robots.mean(axis=0)
+        direction = direction_to(item, scene.target)
+        u = swarm_input(mean[None], item, direction, self._radius, s)[0]
+        x, y = printed_sigmas(len(robots))
+        density = tangential(mean + s.lead * u, item, s.sigma_x or x, s.sigma_y or y)
+        centroids = self._coverage.centroids(robots, density)
+        phase = self._phase(mean - item, direction)
+        return SwarmStep(s.gain * (centroids - robots), density, centroids, phase)
+
+    def _phase(self, d: Array, direction: Array) -> SwarmPhase:
+        away = float(np.hypot(*d))
+        if away > (1.0 + self.settings.overlap) * self.settings.attraction * self._radius:
+            return SwarmPhase.GATHER
+        behind = -float(d @ direction) >= away * np.cos((1.0 - self.settings.cone) * np.pi)
+        if not behind:
+            return SwarmPhase.GO_ROUND
+        near = away <= self.settings.repulsion * self._radius
+        return SwarmPhase.PUSH if near else SwarmPhase.REALIGN

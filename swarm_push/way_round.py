@@ -1,0 +1,107 @@
+"""Ways of robots round a convex object: towards a place on its other side, without touching it.
+
+All in the object's frame. Compiled, for there may be a thousand robots.
+"""
+
+import math
+from typing import Any
+
+import numba
+import numpy as np
+
+from push_model.arrays import Array
+from swarm_push.rim import Rim
+
+_NEAR = 3.0  # robots' radii within which a robot at the object slides along it
+
+
+class WayRound:
+    """Of round robots about one object."""
+
+    def __init__(self, outline: Array, radius: float, clearance: float) -> None:
+        """outline: ``(k, 2)`` [m] about the centre of mass. clearance: [m] that robots keep from
+        the object as they go round it."""
+        self._radius = radius
+        self._way = Rim(outline, radius + clearance, 0.05).points
+        self._keep = Rim(outline, radius + 0.6 * clearance, 0.02).points
+        self._core = Rim(outline, 0.7 * radius, 0.02).points
+
+    def aims(self, robots: Array, goals: Array) -> tuple[Array, Array]:
+        """Where robots ``(n, 2)`` [m] head for on their ways to goals ``(n, 2)``, and how far
+        ``(n,)`` [m] they have to go."""
+        aims, length = _aims(
+            np.ascontiguousarray(robots),
+            np.ascontiguousarray(goals),
+            self._way,
+            self._keep,
+            self._core,
+            _NEAR * self._radius,
+        )
+        return aims, length
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _blocked(ax: float, ay: float, bx: float, by: float, polygon: Any) -> bool:
+    """Whether the way from a to b leads through a convex polygon, counter-clockwise."""
+    low, high = 0.0, 1.0
+    n = polygon.shape[0]
+    for k in range(n):
+        px, py = polygon[k, 0], polygon[k, 1]
+        u = k + 1 if k + 1 < n else 0
+        nx, ny = polygon[u, 1] - py, px - polygon[u, 0]  # outward
+        a, b = nx * (ax - px) + ny * (ay - py), nx * (bx - px) + ny * (by - py)
+        if a >= 0.0 and b >= 0.0:
+            return False
+        if a > 0.0:
+            low = max(low, a / (a - b))
+        elif b > 0.0:
+            high = min(high, a / (a - b))
+        if high - low < 1e-9:
+            return False
+    return True
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _closest(x: float, y: float, way: Any) -> int:
+    best, found = math.inf, 0
+    for k in range(way.shape[0]):
+        d = (way[k, 0] - x) ** 2 + (way[k, 1] - y) ** 2
+        if d < best:
+            best, found = d, k
+    return found
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _aims(robots: Any, goals: Any, way: Any, keep: Any, core: Any, near: float) -> Any:
+    n, m = robots.shape[0], way.shape[0]
+    step = math.hypot(way[1, 0] - way[0, 0], way[1, 1] - way[0, 1])
+    aims, length = np.empty((n, 2)), np.empty(n)
+    for i in range(n):
+        x, y, gx, gy = robots[i, 0], robots[i, 1], goals[i, 0], goals[i, 1]
+        straight = math.hypot(gx - x, gy - y)
+        aims[i, 0], aims[i, 1], length[i] = gx, gy, straight
+        if straight < near and not _blocked(x, y, gx, gy, core):
+            continue
+        last = _closest(gx, gy, way)
+        # The goal may lie at the object: the way leads to what is outside of it, then straight in.
+        tail = math.hypot(gx - way[last, 0], gy - way[last, 1])
+        if not _blocked(x, y, gx, gy, keep):
+            continue
+        if not _blocked(x, y, way[last, 0], way[last, 1], keep):
+            aims[i, 0], aims[i, 1] = way[last, 0], way[last, 1]
+            length[i] = math.hypot(way[last, 0] - x, way[last, 1] - y) + tail
+            continue
+        first = _closest(x, y, way)
+        ahead = (last - first) % m
+        turn = 1 if ahead <= m - ahead else -1
+        steps = min(ahead, m - ahead)
+        aim = (first + turn) % m
+        for k in range(steps, 0, -1):
+            j = (first + turn * k) % m
+            if not _blocked(x, y, way[j, 0], way[j, 1], keep):
+                aim = j
+                steps -= k
+                break
+        aims[i, 0], aims[i, 1] = way[aim, 0], way[aim, 1]
+        length[i] = math.hypot(way[aim, 0] - x, way[aim, 1] - y) + steps * step + tail
+    return aims, length
