@@ -19,7 +19,12 @@ def add_scenario(parser: argparse.ArgumentParser, default: str | None = "env1-ta
     )
 
 
-SCENARIOS = {"single": "env1-target1", "torque": "wheel-slip", "group": "group-ellipse"}
+SCENARIOS = {
+    "single": "env1-target1",
+    "torque": "wheel-slip",
+    "group": "group-ellipse",
+    "swarm": "swarm-square",
+}
 """Of each system, where none is named."""
 
 

@@ -21,6 +21,10 @@ from push_scenario.scenario import Scenario
 from push_supervisor import SupervisorSettings
 from sim_bridge.settings import BridgeSettings, MotionCaptureSettings, PhysicsSettings
 from sim_bridge.worlds import world_kind
+from swarm_push.crescent_law import CrescentLawSettings
+from swarm_push.laws import LawSettings
+from swarm_push.swarm_job import SwarmJobSettings
+from swarm_push.thesis_law import ThesisLawSettings
 
 SECTIONS: dict[str, dict[str, type[Any]]] = {
     "bridge": {
@@ -44,6 +48,13 @@ SECTIONS: dict[str, dict[str, type[Any]]] = {
         "poses": PoseGateSettings,
     },
     "optimizer": {"": StepSettings, "placement": PlacementSettings},
+    "swarm": {
+        "": SwarmJobSettings,
+        "law": LawSettings,
+        "crescent": CrescentLawSettings,
+        "thesis": ThesisLawSettings,
+        "poses": PoseGateSettings,
+    },
     "torque_controller": {
         "nmpc": WheelSlipSettings,
         "tracker": TorqueTrackerSettings,

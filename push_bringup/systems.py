@@ -29,6 +29,12 @@ waited for [s] is never dead, it is the machine that is busy."""
 GROUP_MOST = 5
 """Robots of a group at most."""
 
+OWNERS = ("supervisor", "group", "swarm")
+"""Kinds of nodes that own jobs: one a team."""
+
+CROWDS = ("group", "swarm")
+"""Those of them that command all robots of their team themselves."""
+
 MODULES = {
     "bridge": "sim_bridge.node",
     "planner": "push_planner.node",
@@ -37,6 +43,7 @@ MODULES = {
     "torque_controller": "push_mpc.torque_node",
     "group": "grasp_opt.node",
     "optimizer": "grasp_opt.optimizer_node",
+    "swarm": "swarm_push.node",
     "recorder": "push_record.recorder",
 }
 """Kind of a node to the module whose ``main`` runs it in a process of its own."""
@@ -66,13 +73,13 @@ class NodeSpec:
     def words(self, scenario: str) -> list[str]:
         """Command line of its process; scenario: name or path of the file that it reads."""
         values: dict[str, Any] = {"scenario": scenario, **self.parameters}
-        if self.kind in ("planner", "supervisor", "group", "optimizer", "recorder"):
+        if self.kind in (*OWNERS, "planner", "optimizer", "recorder"):
             values["world"] = self.world
         if self.kind in ("controller", "supervisor", "torque_controller"):
             values["robot"] = self.robot
-        if self.kind in ("group", "optimizer"):
+        if self.kind in (*CROWDS, "optimizer"):
             values["robots"] = list(self.robots)
-        if self.kind in ("supervisor", "group", "optimizer"):
+        if self.kind in (*OWNERS, "optimizer"):
             values["object"] = self.item
         remaps = {"__ns": self.namespace, **self.remaps}
         words = ["--ros-args"]
@@ -131,6 +138,12 @@ def _optimizer(spec: NodeSpec, scenario: Scenario) -> Node:
     return OptimizerNode(scenario, spec.robots, spec.item, spec.namespace, spec.world)
 
 
+def _swarm(spec: NodeSpec, scenario: Scenario) -> Node:
+    from swarm_push.node import SwarmNode
+
+    return SwarmNode(scenario, spec.robots, spec.item, spec.namespace, spec.world)
+
+
 _MAKERS: dict[str, Callable[[NodeSpec, Scenario], Node]] = {
     "bridge": _bridge,
     "planner": _planner,
@@ -139,6 +152,7 @@ _MAKERS: dict[str, Callable[[NodeSpec, Scenario], Node]] = {
     "torque_controller": _torque_controller,
     "group": _group,
     "optimizer": _optimizer,
+    "swarm": _swarm,
 }
 
 
@@ -209,6 +223,25 @@ def torque(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
     )
 
 
+def _check_crowd(scenario: Scenario, team: Team, system: str) -> str:
+    """Who the team is, in words. Raise SettingsError unless it has an object, and round robots of
+    one type with wheels of controlled speed."""
+    whose = f"scenario '{scenario.name}': " + (f"team '{team.name}'" if team.name else "it")
+    if not team.robots:
+        raise SettingsError(f"{whose} has no robots")
+    if not team.object:
+        raise SettingsError(f"{whose} has no object to push")
+    types = [scenario.robots[name][0] for name in team.robots]
+    if any(t != types[0] for t in types):
+        raise SettingsError(f"{whose} has robots of several types, a {system} is of one type")
+    if not isinstance(types[0].bumper, RingBumper) or not isinstance(types[0].drive, SpeedDrive):
+        raise SettingsError(
+            f"{whose} has robots without a ring bumper and wheels of controlled speed, which "
+            f"a {system} needs"
+        )
+    return whose
+
+
 def group(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
     """Two to five robots that push one object, for each team; all in one world.
 
@@ -220,23 +253,11 @@ def group(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
     world = _absolute(namespace)
     nodes = [NodeSpec("bridge", "bridge", world, world)]
     for team in teams_of(scenario):
-        whose = f"scenario '{scenario.name}': " + (f"team '{team.name}'" if team.name else "it")
+        whose = _check_crowd(scenario, team, "group")
         count = len(team.robots)
         if not 2 <= count <= GROUP_MOST:
             raise SettingsError(
                 f"{whose} has {count} robots, the system 'group' takes 2 to {GROUP_MOST} a team"
-            )
-        if not team.object:
-            raise SettingsError(f"{whose} has no object to push")
-        types = [scenario.robots[name][0] for name in team.robots]
-        if any(t != types[0] for t in types):
-            raise SettingsError(f"{whose} has robots of several types, a group is of one type")
-        if not isinstance(types[0].bumper, RingBumper) or not isinstance(
-            types[0].drive, SpeedDrive
-        ):
-            raise SettingsError(
-                f"{whose} has robots without a ring bumper and wheels of controlled speed, which "
-                "a group needs"
             )
         if not scenario.objects[team.object][0].geometry.convex:
             raise SettingsError(
@@ -260,10 +281,39 @@ def group(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
     return tuple(nodes)
 
 
+def swarm(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
+    """Any number of robots that move one object, for each team; all in one world.
+
+    Raises
+    ------
+    SettingsError: a team has no robot or no object, robots of several types, or without a round
+        bumper and wheels of controlled speed.
+    """
+    world = _absolute(namespace)
+    nodes = [NodeSpec("bridge", "bridge", world, world)]
+    for team in teams_of(scenario):
+        _check_crowd(scenario, team, "swarm")
+        place = team_space(namespace, team.name)
+        name = f"{team.name}/swarm" if team.name else "swarm"
+        nodes.append(
+            NodeSpec(
+                name,
+                "swarm",
+                place,
+                world,
+                robots=team.robots,
+                item=team.object,
+                team=team.name,
+            )
+        )
+    return tuple(nodes)
+
+
 SYSTEMS: dict[str, Callable[[Scenario, str], tuple[NodeSpec, ...]]] = {
     "single": single,
     "torque": torque,
     "group": group,
+    "swarm": swarm,
 }
 """Name of a system to the function that lists its nodes for a scenario in a namespace."""
 

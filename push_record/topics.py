@@ -20,6 +20,7 @@ from push_msgs.msg import (
     JobState,
     Poses,
     PushPlan,
+    SwarmStatus,
     Velocities,
     WheelTorques,
 )
@@ -68,6 +69,7 @@ TEAM = {
     "push_path": Topic(PathMessage, LATCHED),
     "group_plan": Topic(GroupPlan, LATCHED),
     "group_status": Topic(GroupStatus, STATUS),
+    "swarm_status": Topic(SwarmStatus, STATUS),
     "job_state": Topic(JobState, LATCHED),
     "status_text": Topic(String, LATCHED),
 }

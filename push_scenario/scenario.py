@@ -60,6 +60,7 @@ NODES = (
     "torque_controller",
     "group",
     "optimizer",
+    "swarm",
 )
 """Nodes that a scenario may have parameters for."""
 

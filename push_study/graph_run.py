@@ -17,7 +17,7 @@ from push_bringup.job_result import JobResult, result_of
 from push_bringup.monitor import Pose
 from push_bringup.node_settings import changed, resolved
 from push_bringup.suite import scenario_goals
-from push_bringup.systems import LOCKSTEP, NodeSpec, nodes_of, teams_of
+from push_bringup.systems import CROWDS, LOCKSTEP, OWNERS, NodeSpec, nodes_of, teams_of
 from push_model.arrays import Array
 from push_model.jobs import JobError
 from push_msgs.msg import JobState
@@ -28,12 +28,12 @@ from push_scenario.scenario import Scenario
 from push_study.observer import Observer
 
 _ROLES = ("controller", "planner", "supervisor")
-_OWNERS = ("supervisor", "group")
 
 
 @dataclass
 class TeamRun:
-    """The nodes of a team, and who watches it. A group's node is its controller and supervisor."""
+    """The nodes of a team, and who watches it. A group's node is its controller and supervisor,
+    a swarm's is all three."""
 
     controller: Any
     planner: Any
@@ -114,7 +114,7 @@ class LockstepRun:
             self.teams: dict[str, TeamRun] = {}
             for team in teams_of(scenario):
                 parts = {s.kind: s for s in specs if s.kind != "bridge" and s.team == team.name}
-                owner = next(k for k in _OWNERS if k in parts)
+                owner = next(k for k in OWNERS if k in parts)
                 names = Names(space(namespace), space(parts[owner].namespace))
                 observer = Observer(names, team.robots, team.object)
                 nodes.append(observer)
@@ -129,9 +129,9 @@ class LockstepRun:
         self.controller, self.planner = first.controller, first.planner
         self.supervisor, self.observer = first.supervisor, first.observer
         kinds = [s.kind for s in specs]
-        owned = [len(s.robots) for s in specs if s.kind == "group"]
+        owned = [len(s.robots) for s in specs if s.kind in CROWDS]
         self._commanded = kinds.count("supervisor") + sum(owned)
-        self._listeners = 2 * kinds.count("supervisor") + kinds.count("group")
+        self._listeners = 2 * kinds.count("supervisor") + len(owned)
         self.spinner = Spinner(nodes)
 
     def __enter__(self) -> "LockstepRun":
@@ -229,6 +229,8 @@ class LockstepRun:
 def _team_run(
     made: Mapping[str, Any], parts: Mapping[str, NodeSpec], observer: Observer
 ) -> TeamRun:
-    kinds = ("group", "optimizer", "group") if "group" in parts else _ROLES
+    owner = next(k for k in OWNERS if k in parts)
+    own = {"supervisor": _ROLES, "group": ("group", "optimizer", "group")}
+    kinds = own.get(owner, (owner, owner, owner))
     controller, planner, supervisor = (made[parts[k].name] for k in kinds)
     return TeamRun(controller, planner, supervisor, observer)

@@ -24,7 +24,6 @@ from swarm_push.coverage import Coverage
 from swarm_push.crescent import crescent
 from swarm_push.law import Scene, SwarmPhase, SwarmStep
 from swarm_push.rim import Rim
-from swarm_push.spacing import keep_apart
 from swarm_push.way_round import WayRound
 
 
@@ -43,8 +42,6 @@ class CrescentLawSettings:
     least: float = bounded(0.3, low=0.0, high=0.99, doc="part of the approach that makes a place")
     hold: float = bounded(0.25, low=0.0, high=1.0, doc="part of the wrench that may lack to begin")
     lost: float = bounded(0.7, low=0.0, high=1.0, doc="part that may lack as they push")
-    apart: float = bounded(4e-3, low=0.0, high=1.0, doc="[m] between robots")
-    closing: float = bounded(3.0, low=0.01, high=100.0, doc="[1/s] of gaps between robots")
 
 
 class CrescentLaw:
@@ -85,16 +82,27 @@ class CrescentLaw:
         density = crescent(self._rim, pose, twist, off, s.least)
         centroids = self._coverage.centroids(scene.robots, density)
         goals = se2.transform(se2.inverse(pose), centroids)
-        aims, length = self._round.aims(local, goals)
+        aims, length = self._way_round(scene).aims(local, goals)
         near = length < 3.0 * self._radius
         phase = self._phase(near, held, local)
         moved = self._towards(aims - local, length)
         if self._pushing:
             moved += rigid(twist, local)
-        moved = keep_apart(
-            moved, local, 2.0 * self._radius + s.apart, s.closing, 4.0 * self._radius
-        )
-        return SwarmStep(moved @ se2.rotation_matrix(float(pose[2])).T, density, centroids, phase)
+        moved = moved @ se2.rotation_matrix(float(pose[2])).T
+        return SwarmStep(moved, density, centroids, phase)
+
+    def _way_round(self, scene: Scene) -> WayRound:
+        """Round the object, and round what stands at it."""
+        if not len(scene.others):
+            return self._round
+        local = scene.others.copy()
+        local[:, :2] = se2.transform(se2.inverse(scene.pose), scene.others[:, :2])
+        away = np.hypot(*(local[:, None, :2] - self._fine.points).transpose(2, 0, 1)).min(axis=1)
+        room = self._radius + 2.0 * self.settings.clearance
+        close = local[away - local[:, 2] < room]
+        if not len(close):
+            return self._round
+        return WayRound(self._item.geometry.outline, self._radius, self.settings.clearance, close)
 
     def _twist(self, pose: Array, target: Array) -> Array:
         """``(3,)`` that the object is to have, in its frame."""

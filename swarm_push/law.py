@@ -26,13 +26,15 @@ class Scene:
     """What a law sees.
 
     time: [s]. pose ``(3,)`` of the object's centre of mass. robots ``(n, 2)`` [m]. target ``(3,)``:
-    where the centre of mass is to be, its heading nan where any will do.
+    where the centre of mass is to be, its heading nan where any will do. others ``(k, 3)`` x, y,
+    radius [m] of what stands about: robots that do not move, other bodies.
     """
 
     time: float
     pose: Array
     robots: Array
     target: Array
+    others: Array
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,8 @@
 """Robots that keep apart: velocities changed as little as need be. Compiled.
 
 Two robots may come closer by so much of the gap between them in a second; what they lack of that,
-each of both gives half. Robots that push side by side move alike and are not touched by it.
+each of both gives half, or the one that moves all of it. Robots that push side by side move alike
+and are not touched by it.
 """
 
 import math
@@ -16,23 +17,29 @@ _SWEEPS = 8
 
 
 def keep_apart(
-    velocities: Array, points: Array, distance: float, rate: float, reach: float
+    velocities: Array, points: Array, radii: Array, gap: float, rate: float, reach: float
 ) -> Array:
-    """Velocities ``(n, 2)`` [m/s] of robots at ``(n, 2)`` [m], changed.
+    """Velocities ``(n, 2)`` [m/s] of the first n bodies at ``(m, 2)`` [m], changed; further bodies
+    stand.
 
-    distance: [m] between centres that is kept. rate: [1/s] of the gap that may close. reach: [m]
-    beyond ``distance`` up to which pairs are looked at.
+    radii: ``(m,)`` [m]. gap: [m] between bodies that is kept. rate: [1/s] of the gap beyond it that
+    may close. reach: [m] of gaps up to which pairs are looked at.
     """
-    moved = np.array(velocities, dtype=np.float64)
+    moved = np.zeros((len(points), 2))
+    moved[: len(velocities)] = velocities
     if len(points) > 1:
         order = np.argsort(points[:, 0], kind="stable")
-        _part(moved, np.ascontiguousarray(points), order, distance, rate, reach)
-    return moved
+        points, radii = np.ascontiguousarray(points), np.ascontiguousarray(radii)
+        _part(moved, len(velocities), points, radii, order, gap, rate, reach)
+    return moved[: len(velocities)]
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _part(moved: Any, points: Any, order: Any, distance: float, rate: float, reach: float) -> None:
-    n = order.shape[0]
+def _part(
+    moved: Any, count: int, points: Any, radii: Any, order: Any, gap: float, rate: float,
+    reach: float,
+) -> None:  # fmt: skip
+    n, widest = order.shape[0], radii.max()
     for _ in range(_SWEEPS):
         most = 0.0
         for a in range(n):
@@ -40,20 +47,27 @@ def _part(moved: Any, points: Any, order: Any, distance: float, rate: float, rea
             for b in range(a + 1, n):
                 j = order[b]
                 dx = points[j, 0] - points[i, 0]
-                if dx > distance + reach:
+                if dx > radii[i] + widest + reach:
                     break
+                if i >= count and j >= count:
+                    continue
                 dy = points[j, 1] - points[i, 1]
                 away = math.hypot(dx, dy)
-                if away > distance + reach or away < 1e-9:
+                room = away - radii[i] - radii[j]
+                if room > reach or away < 1e-9:
                     continue
                 ux, uy = dx / away, dy / away
                 closing = (moved[i, 0] - moved[j, 0]) * ux + (moved[i, 1] - moved[j, 1]) * uy
-                excess = closing - rate * (away - distance)
-                if excess > 0.0:
-                    most = max(most, excess)
-                    moved[i, 0] -= 0.5 * excess * ux
-                    moved[i, 1] -= 0.5 * excess * uy
-                    moved[j, 0] += 0.5 * excess * ux
-                    moved[j, 1] += 0.5 * excess * uy
+                excess = closing - rate * (room - gap)
+                if excess <= 0.0:
+                    continue
+                most = max(most, excess)
+                part = 0.5 if i < count and j < count else 1.0
+                if i < count:
+                    moved[i, 0] -= part * excess * ux
+                    moved[i, 1] -= part * excess * uy
+                if j < count:
+                    moved[j, 0] += part * excess * ux
+                    moved[j, 1] += part * excess * uy
         if most < 1e-4:
             break

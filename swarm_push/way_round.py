@@ -18,12 +18,16 @@ _NEAR = 3.0  # robots' radii within which a robot at the object slides along it
 class WayRound:
     """Of round robots about one object."""
 
-    def __init__(self, outline: Array, radius: float, clearance: float) -> None:
+    def __init__(
+        self, outline: Array, radius: float, clearance: float, others: Array | None = None
+    ) -> None:
         """outline: ``(k, 2)`` [m] about the centre of mass. clearance: [m] that robots keep from
-        the object as they go round it."""
+        the object as they go round it. others: ``(k, 3)`` x, y, radius [m] of what stands at the
+        object, in its frame; robots go round both together."""
         self._radius = radius
-        self._way = Rim(outline, radius + clearance, 0.05).points
-        self._keep = Rim(outline, radius + 0.6 * clearance, 0.02).points
+        whole = outline if others is None else np.vstack([outline, *map(_disc, others)])
+        self._way = Rim(whole, radius + clearance, 0.05).points
+        self._keep = Rim(whole, radius + 0.6 * clearance, 0.02).points
         self._core = Rim(outline, 0.7 * radius, 0.02).points
 
     def aims(self, robots: Array, goals: Array) -> tuple[Array, Array]:
@@ -38,6 +42,12 @@ class WayRound:
             _NEAR * self._radius,
         )
         return aims, length
+
+
+def _disc(other: Array) -> Array:
+    angle = np.arange(12) * math.pi / 6.0
+    corners: Array = other[:2] + other[2] * np.column_stack([np.cos(angle), np.sin(angle)])
+    return corners
 
 
 @numba.njit(cache=True, error_model="numpy")

@@ -1,0 +1,38 @@
+"""The laws by name. A further one is a file like these, its settings, and a row here."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from push_model.arrays import Array
+from push_model.settings import bounded, settings
+from push_model.specs import ObjectSpec
+from swarm_push.crescent_law import CrescentLaw, CrescentLawSettings
+from swarm_push.law import SwarmLaw
+from swarm_push.thesis_law import ThesisLaw, ThesisLawSettings
+
+
+@settings
+class LawSettings:
+    """Which law moves a swarm."""
+
+    law: Literal["crescent", "thesis"] = bounded("crescent", doc="as printed, or ours")
+
+
+@dataclass(frozen=True)
+class LawSections:
+    """Settings of all laws, of which one is used."""
+
+    law: LawSettings = field(default_factory=LawSettings)
+    crescent: CrescentLawSettings = field(default_factory=CrescentLawSettings)
+    thesis: ThesisLawSettings = field(default_factory=ThesisLawSettings)
+
+
+def make_law(
+    sections: LawSections, region: Array, item: ObjectSpec, radius: float, speed: float
+) -> SwarmLaw:
+    """For round robots of a radius [m] and a greatest speed [m/s] that push an object in a convex
+    region ``(m, 2)`` [m] of their centres."""
+    if sections.law.law == "thesis":
+        around = float((item.geometry.outline**2).sum(axis=1).max() ** 0.5)
+        return ThesisLaw(region, around, sections.thesis)
+    return CrescentLaw(region, item, radius, speed, sections.crescent)

@@ -1,0 +1,336 @@
+"""The swarm's node: targets in, velocities of all robots that are seen out.
+
+Every frame of the pose stream is answered with one message on ``cmd_vels``.
+"""
+
+import math
+import sys
+import time
+from typing import Any
+
+import numpy as np
+from nav_msgs.msg import OccupancyGrid
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from std_msgs.msg import Header
+
+from push_estimation.pose_gate import PoseGateSettings, Stamp
+from push_model.arrays import Array
+from push_model.free_space import FreeSpace
+from push_model.jobs import GoalRefused, JobError, JobPhase
+from push_model.occupancy import OccupancyGrid as Grid
+from push_msgs.action import MoveObject, SwarmMove
+from push_msgs.msg import SwarmStatus, Velocities
+from push_ros.actions import GoalServer
+from push_ros.conversions import grid_from_ros
+from push_ros.diagnostics import Diagnostics
+from push_ros.job_intake import JobIntake
+from push_ros.names import names_of
+from push_ros.parameters import declare_settings
+from push_ros.pose_feed import Frame, PoseFeed
+from push_ros.process import run_node
+from push_ros.qos import COMMAND, LATCHED, STATUS
+from push_ros.validation import InvalidMessage
+from push_scenario.scenario import Scenario, load_scenario
+from swarm_push.crescent_law import CrescentLawSettings
+from swarm_push.laws import LawSections, LawSettings
+from swarm_push.region import open_region
+from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
+from swarm_push.swarm_messages import status_to_ros, targets_from_ros
+from swarm_push.thesis_law import ThesisLawSettings
+
+_PATIENCE = 10.0  # [s] wall time for poses
+
+
+class SwarmNode(Node):
+    """Robots of one type, one object, one job at a time."""
+
+    def __init__(
+        self,
+        scenario: Scenario | None = None,
+        robots: tuple[str, ...] = (),
+        item: str = "",
+        namespace: str = "",
+        world: str = "",
+    ) -> None:
+        """robots, item: the swarm's. namespace: the team's; world: the bridge's, where it is
+        another one."""
+        super().__init__("swarm", namespace=namespace)
+        self.names = names = names_of(self, world)
+        name = self.declare_parameter("scenario", "swarm-square").value
+        scenario = scenario or load_scenario(str(name))
+        given = self.declare_parameter("robots", list(robots) or [""]).value
+        self.robots = tuple(r for r in given if r) or tuple(scenario.robots)
+        item = str(self.declare_parameter("object", item).value)
+        _, self._robot = scenario.robot(self.robots[0])
+        self.object, self._item = scenario.object(item)
+        values = dict(scenario.parameters.get("swarm", {}))
+        sections = {k: values.pop(k, {}) for k in ("law", "crescent", "thesis", "poses")}
+        self._settings = declare_settings(self, SwarmJobSettings, values, where="swarm")
+        self._laws = LawSections(
+            declare_settings(self, LawSettings, sections["law"], "law", "swarm.law"),
+            declare_settings(
+                self, CrescentLawSettings, sections["crescent"], "crescent", "swarm.crescent"
+            ),
+            declare_settings(self, ThesisLawSettings, sections["thesis"], "thesis", "swarm.thesis"),
+        )
+        gate = declare_settings(self, PoseGateSettings, sections["poses"], "poses", "swarm.poses")
+        self._others = {
+            k: r for k, r in scenario.radii.items() if k not in (*self.robots, self.object)
+        }
+        self.job: SwarmJob | None = None
+        self._grid: Grid | None = None
+        self._space: FreeSpace | None = None
+        self._waiting = time.monotonic()
+        self._told: tuple[JobPhase, str, int] | None = None
+        self._stamp = Header().stamp
+        self._pose = np.zeros(3)
+        self._diagnostics = Diagnostics(self, names, self._state)
+        self._commands = self.create_publisher(Velocities, names.world("cmd_vels"), COMMAND)
+        self._status = self.create_publisher(SwarmStatus, names.team("swarm_status"), STATUS)
+        self._poses = PoseFeed(
+            self,
+            names,
+            gate,
+            [*self.robots, self.object, *self._others],
+            self._diagnostics,
+            self._on_frame,
+        )
+        self._intake = JobIntake(
+            self, names, self._diagnostics, self, "swarm", list(self.robots), self.object
+        )
+        self._moves = GoalServer(
+            self,
+            SwarmMove,
+            names.team("swarm_move"),
+            check=lambda request: None,
+            refuse=self._refuse_targets,
+            start=self._begin_targets,
+            cancel=lambda: self.end_job(JobError.CANCELED, "canceled"),
+            preempt=lambda request: self.end_job(JobError.PREEMPTED, "other targets replace it"),
+        )
+        self.create_subscription(
+            OccupancyGrid,
+            names.world("map"),
+            self._on_map,
+            LATCHED,
+            event_callbacks=self._diagnostics.subscription_events(names.world("map")),
+        )
+        self._watchdog = self.create_timer(
+            0.1, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
+        self._publish_state()
+
+    @property
+    def ready(self) -> bool:
+        """Whether a goal could be worked on."""
+        return self._grid is not None
+
+    # The owner of the job, see JobOwner
+
+    @property
+    def busy(self) -> bool:
+        """See JobOwner."""
+        return self.job is not None and self.job.busy
+
+    @property
+    def plan_ready(self) -> bool:
+        """A swarm makes no plans."""
+        return False
+
+    def check_goal(self, goal: Array) -> None:
+        """See JobOwner."""
+        if self._grid is None or self._space is None:
+            return
+        if self.job is None:
+            raise GoalRefused(
+                JobError.PLANNING_FAILED, "the map has obstacles: a swarm needs an open room"
+            )
+        if not self._grid.contains(float(goal[0]), float(goal[1])):
+            raise GoalRefused(JobError.OUTSIDE_MAP, "the goal is outside the map")
+        reach = float(np.hypot(*self._item.outline.T).max())
+        if self._space.clearance(goal[None, :2])[0] < reach:
+            raise GoalRefused(JobError.GOAL_OCCUPIED, "the object does not fit there")
+
+    def take_goal(self, goal: Array, plan_only: bool) -> None:
+        """See JobOwner."""
+        target = self._item.mass_pose(goal)
+        if not self._settings.orientation:
+            target = np.array([*goal[:2], math.nan])
+        self._begin([target])
+        if plan_only:
+            self.end_job(JobError.INVALID_GOAL, "a swarm makes no plans that could wait")
+
+    def end_job(self, code: JobError, message: str) -> None:
+        """See JobOwner."""
+        if self.job is not None:
+            self.job.end(code, message)
+        self._look_after_job()
+
+    def execute(self) -> None:
+        """See JobOwner; there is never a plan that waits."""
+
+    # Targets
+
+    def _refuse_targets(self, request: Any) -> Any:
+        """The result for targets that cannot be; None where they can."""
+        try:
+            if request.object not in ("", self.object):
+                raise GoalRefused(JobError.UNKNOWN_OBJECT, f"unknown object '{request.object}'")
+            for target in targets_from_ros(request, self._item):
+                self.check_goal(target)
+        except InvalidMessage as error:
+            self._diagnostics.refuse("swarm_move", str(error))
+            return SwarmMove.Result(error_code=int(JobError.INVALID_GOAL), error_msg=str(error))
+        except GoalRefused as refusal:
+            return SwarmMove.Result(error_code=int(refusal.code), error_msg=str(refusal))
+        return None
+
+    def _begin_targets(self, request: Any) -> None:
+        self._begin(targets_from_ros(request, self._item))
+
+    def _begin(self, targets: list[Array]) -> None:
+        self._waiting = time.monotonic()
+        if self.job is not None:
+            self.job.begin(targets)
+        self._look_after_job()
+
+    # The world
+
+    def _on_map(self, message: OccupancyGrid) -> None:
+        try:
+            grid = grid_from_ros(message)
+        except InvalidMessage as error:
+            self._diagnostics.refuse("/map", str(error))
+            return
+        if self._grid is not None and self._grid.equals(grid):
+            return
+        self.end_job(JobError.PREEMPTED, "the map has changed")
+        self._grid, self._space = grid, FreeSpace(grid)
+        region = open_region(grid, self._robot.footprint_radius)
+        self.job = None
+        if region is not None:
+            self.job = SwarmJob(region, self._item, self._robot, self._settings, self._laws)
+        self._look_after_job()
+
+    def _on_frame(self, frame: Frame) -> None:
+        self._stamp = frame.stamp
+        twists: dict[str, tuple[float, float]] = {}
+        if frame.verdict is Stamp.RESET:
+            self.end_job(JobError.CLOCK_RESET, "the clock went back")
+        elif frame.verdict is not Stamp.REFUSED:
+            twists = self._tick()
+        self._publish(twists)
+        self._look_after_job()
+
+    def _tick(self) -> dict[str, tuple[float, float]]:
+        """Twists of all robots that are seen; they stand while the object is not."""
+        item = self._poses.pose(self.object)
+        if item is None or self.job is None or not self.job.busy:
+            return {}
+        self._waiting = time.monotonic()
+        self._pose = self._item.mass_pose(item)
+        seen = {n: p for n in self.robots if (p := self._poses.pose(n)) is not None}
+        bodies = {n: self._poses.pose(n) for n in self._others}
+        others = [[*p[:2], self._others[n]] for n, p in bodies.items() if p is not None]
+        began = time.thread_time()
+        twists = self.job.step(self._poses.stamp, self._pose, seen, np.array(others).reshape(-1, 3))
+        if self.job.last is not None:
+            cost, names = time.thread_time() - began, self.job.taking_part
+            law = self._laws.law.law
+            self._status.publish(
+                status_to_ros(self._stamp, self.object, law, names, self.job, self._pose, cost)
+            )
+        return twists
+
+    def _publish(self, twists: dict[str, tuple[float, float]]) -> None:
+        """To every robot, also those that are not seen: they stand."""
+        told = [twists.get(name, (0.0, 0.0)) for name in self.robots]
+        message = Velocities(
+            names=list(self.robots), vx=[v for v, _ in told], omega=[w for _, w in told]
+        )
+        message.header.stamp, message.header.frame_id = self._stamp, "base_link"
+        self._commands.publish(message)
+
+    def _on_watchdog(self) -> None:
+        """Wall time, for when nothing comes."""
+        now = time.monotonic()
+        if not self.busy or self._poses.paused:
+            self._waiting = now
+        elif now - self._waiting > _PATIENCE:
+            self.end_job(JobError.POSES_STALE, "poses of the object do not come")
+
+    # Outputs
+
+    def _look_after_job(self) -> None:
+        """Tell how the job stands, end what has ended."""
+        job = self.job
+        state = (
+            (JobPhase.IDLE, "waiting for a map", 0)
+            if job is None
+            else (job.state, job.reason, job.index)
+        )
+        if state == self._told:
+            return
+        ended = self._told is not None and self._told[0] is not JobPhase.IDLE
+        self._told = state
+        self._publish_state()
+        if ended and not self.busy:
+            self._finish()
+
+    def _publish_state(self) -> None:
+        job = self.job
+        state, reason, index = self._told or (JobPhase.IDLE, "waiting for a map", 0)
+        count = len(job.targets) if job is not None else 0
+        self._intake.publish(
+            self._poses.stamp,
+            state=int(state),
+            state_name=state.name,
+            reason=reason,
+            error_code=0 if job is None else int(job.error),
+            progress=index / count if count else float(not self.busy),
+            step_index=min(index, max(0, count - 1)),
+            step_count=count,
+        )
+        self.get_logger().info(f"{state.name}: {reason}")
+
+    def _finish(self) -> None:
+        """Tell whoever waits how the job ended."""
+        job = self.job
+        if job is None:
+            return
+        away, turned = job.errors(self._pose)
+        common = {
+            "error_code": int(job.error),
+            "error_msg": "" if job.error is JobError.NONE else job.reason,
+            "position_error": away,
+            "orientation_error": turned,
+        }
+        if self._moves.active:
+            result = SwarmMove.Result(times=job.times, **common)
+            self._moves.finish(result, success=job.error is JobError.NONE)
+        if self._intake.waited_for:
+            self._intake.finish(MoveObject.Result(**common))
+
+    def _state(self) -> dict[str, Any]:
+        job = self.job
+        seen = sum(self._poses.pose(n) is not None for n in self.robots)
+        dead = sorted(job.dead) if job is not None else []
+        return {
+            "state": self._told[0].name if self._told else "IDLE",
+            "reason": self._told[1] if self._told else "",
+            "robots": f"{seen} of {len(self.robots)} seen",
+            "robots that do not move": " ".join(dead),
+            "law": self._laws.law.law,
+            "poses refused": self._poses.gate.refused,
+            "warning": "no poses" if self._poses.pose(self.object) is None else "",
+        }
+
+
+def main() -> int:
+    """Entry point of the process: ``--ros-args`` on its command line."""
+    return run_node(SwarmNode)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

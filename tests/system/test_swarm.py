@@ -1,0 +1,136 @@
+"""A swarm in the whole graph: goals, targets in a row, refusals, robots that die and leave."""
+
+import math
+
+import numpy as np
+import pytest
+from rclpy.action import ActionClient
+
+from push_model.jobs import JobError
+from push_msgs.action import SwarmMove
+from push_msgs.msg import JobState, SwarmStatus
+from push_ros.qos import STATUS
+from push_scenario.scenario import scenario_from_mapping
+from push_study.graph_run import LockstepRun
+from swarm_push.swarm_messages import density_from_ros
+
+VALUES = {
+    "environment": {"size": [4.0, 3.0]},
+    "robots": {
+        "e": {
+            "type": "epuck_ring",
+            "count": 8,
+            "placement": {"random": {"seed": 2, "gap": 0.03, "area": [-1.9, 0.0, -1.4, 1.4]}},
+        }
+    },
+    "objects": {"box": {"type": "swarm_square", "start": [0.3, 0.0, 0.0]}},
+    "goal": [0.8, 0.4, 1.0],
+    "parameters": {"bridge": {"world": "planar"}},
+}
+
+
+def running(**changes):
+    scenario = scenario_from_mapping({**VALUES, **changes}, "test", "test")
+    return LockstepRun(scenario, system="swarm", quiet=True)
+
+
+@pytest.fixture
+def run():
+    with running() as started:
+        started.start()
+        yield started
+
+
+def test_a_pose_is_reached_and_told(run):
+    """And what the swarm covers is told at every tick."""
+    told = []
+    run.observer.create_subscription(SwarmStatus, "/swarm_status", told.append, STATUS)
+    goal = np.array(VALUES["goal"])
+    state = run.reach(goal)
+    assert state is not None and state.error_code == 0 and state.system == "swarm", state.reason
+    assert state.progress == 1.0 and state.state == JobState.IDLE
+    off = run.observer.trace.object[-1] - goal
+    assert np.hypot(*off[:2]) < 0.03 and abs(math.remainder(off[2], 2.0 * math.pi)) < 0.06
+    assert {m.phase for m in told} >= {"go round", "push"} and len(told) > 500
+    for m in told[:: len(told) // 20]:
+        assert len(m.robots) == len(m.centroid_x) == 8 and not m.dead
+        density = density_from_ros(m)
+        assert density.at(density.means).min() > 0.0 and m.solve_time < 1.0
+        assert m.target_theta == pytest.approx(1.0) and math.isfinite(m.position_error)
+
+
+def move(run, x, y, theta=(), limit=400.0):
+    """What the action says of targets."""
+    client = ActionClient(run.observer, SwarmMove, "/swarm_move")
+    assert run.spinner.until(client.server_is_ready, 5.0)
+    goal = SwarmMove.Goal(x=list(x), y=list(y), theta=list(theta))
+    sent = client.send_goal_async(goal)
+    assert run.spin_until(sent.done, 5.0) and sent.result().accepted
+    answer = sent.result().get_result_async()
+    assert run.spin_until(answer.done, limit)
+    return answer.result().result
+
+
+def test_targets_in_a_row_are_reached_without_headings(run):
+    result = move(run, [0.9, 0.0], [0.5, -0.5])
+    assert result.error_code == 0, result.error_msg
+    assert len(result.times) == 2 and min(result.times) > 2.0
+    assert np.hypot(*(run.observer.trace.object[-1] - [0.0, -0.5, 0.0])[:2]) < 0.03
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "theta", "code"),
+    [
+        ([0.5, 9.0], [0.0, 0.0], [], JobError.OUTSIDE_MAP),
+        ([1.9], [0.0], [], JobError.GOAL_OCCUPIED),
+        ([math.nan], [0.0], [], JobError.INVALID_GOAL),
+        ([0.1], [0.0, 1.0], [], JobError.INVALID_GOAL),
+        ([], [], [], JobError.INVALID_GOAL),
+    ],
+)
+def test_targets_that_cannot_be_are_refused(run, x, y, theta, code):
+    before = run.observer.state.job
+    result = move(run, x, y, theta, 5.0)
+    assert result.error_code == code and result.error_msg
+    assert run.observer.state.job == before and run.observer.state.state == JobState.IDLE
+
+
+@pytest.mark.parametrize(
+    ("goal", "code"),
+    [
+        ((9.0, 0.0, 0.0), JobError.OUTSIDE_MAP),
+        ((1.95, 0.0, 0.0), JobError.GOAL_OCCUPIED),
+        ((math.inf, 0.0, 0.0), JobError.INVALID_GOAL),
+    ],
+)
+def test_goals_that_cannot_be_are_refused_with_a_code(run, goal, code):
+    before = run.observer.state.job
+    run.teams[""].send_goal(np.array(goal))
+    assert run.spin_until(lambda: run.teams[""].refused, 5.0)
+    assert run.observer.state.refusal_code == code and run.observer.state.job == before
+
+
+def test_a_room_with_obstacles_is_refused():
+    environment = {"size": [4.0, 3.0], "circles": [{"centre": [1.3, -1.0], "radius": 0.1}]}
+    with running(environment=environment) as run:
+        run.start()
+        run.teams[""].send_goal(np.array(VALUES["goal"]))
+        assert run.spin_until(lambda: run.teams[""].refused, 5.0)
+        assert run.observer.state.refusal_code == JobError.PLANNING_FAILED
+        assert "obstacles" in run.observer.state.refusal
+
+
+def test_the_rest_finish_when_robots_die_and_leave():
+    events = [
+        {"kind": "kill", "at": 5.0, "robot": "e1"},
+        {"kind": "kill", "at": 6.0, "robot": "e2"},
+        {"kind": "remove", "at": 7.0, "robot": "e3"},
+    ]
+    with running(events=events) as run:
+        run.start()
+        told = []
+        run.observer.create_subscription(SwarmStatus, "/swarm_status", told.append, STATUS)
+        state = run.reach(np.array(VALUES["goal"]), 300.0)
+        assert state is not None and state.error_code == 0, state.reason
+        assert {len(m.robots) for m in told} >= {8, 7}
+        assert any({"e1", "e2"} & set(m.dead) for m in told)
