@@ -11,3 +11,10 @@ TABLE_2_1 = {  # Table 2.1: mean and worst position [m] and orientation [rad] er
     "env3-target2": (0.0193, 0.0254, 0.0461, 0.0566),
     "env3-target3": (0.0092, 0.0150, 0.0117, 0.0314),
 }
+
+SWARM_REAL = {"time": 902.0, "std": 17.0, "delta": 50.4, "lambda": 16.3}
+"""Section 4.3.2: [s], [s], [s] a length of the object; lambda of 7.15 m at 0.129 m/s."""
+
+SWARM_RIVALS = {"one global input [1]": (111.2, 5.6), "Gibbs random field": (81.8, 12.0)}
+"""delta [s] and lambda: Shahrokhi et al. 2018 on kilobots of 1 cm/s, as the thesis reckons it;
+Rezeck et al., twenty robots of 6 cm/s."""

@@ -17,7 +17,6 @@ from push_model import se2
 from push_model.arrays import Array, Mask
 from push_model.coulomb import cone_edges
 from push_model.grasp import grasp_matrix
-from push_model.screws import screw_between
 from push_model.settings import bounded, settings
 from push_model.specs import ObjectSpec
 from swarm_push.coverage import Coverage
@@ -25,6 +24,9 @@ from swarm_push.crescent import crescent
 from swarm_push.law import Scene, SwarmPhase, SwarmStep
 from swarm_push.rim import Rim
 from swarm_push.way_round import WayRound
+
+_REACH = 0.1  # [m] of gaps to the object that are looked at
+_WORSE = 0.1  # part of the wrench that may lack beyond what lacked at the beginning
 
 
 @settings
@@ -35,12 +37,17 @@ class CrescentLawSettings:
     slowing: float = bounded(1.0, low=0.01, high=10.0, doc="[1/s] of the way that is left")
     least_speed: float = bounded(0.2, low=0.0, high=1.0, doc="of a push, over the robots' greatest")
     gain: float = bounded(3.0, low=0.01, high=100.0, doc="[1/s] towards centroids")
+    shift: float = bounded(0.3, low=0.0, high=100.0, doc="[1/s] likewise, of those that push")
     press: float = bounded(0.01, low=0.0, high=1.0, doc="[m] of the density into the object")
     wait: float = bounded(6e-3, low=0.0, high=1.0, doc="[m] from it until the push begins")
     clearance: float = bounded(0.02, low=1e-3, high=1.0, doc="[m] of robots that go round it")
+    slide: float = bounded(
+        0.015, low=0.0, high=0.04, doc="[m] into it that one which slides along it may head"
+    )
     contact: float = bounded(0.015, low=1e-3, high=1.0, doc="[m] from it that count as hold")
     least: float = bounded(0.3, low=0.0, high=0.99, doc="part of the approach that makes a place")
     hold: float = bounded(0.25, low=0.0, high=1.0, doc="part of the wrench that may lack to begin")
+    patience: float = bounded(3.0, low=0.0, high=600.0, doc="[s] at most for who is in front")
     lost: float = bounded(0.7, low=0.0, high=1.0, doc="part that may lack as they push")
 
 
@@ -62,34 +69,60 @@ class CrescentLaw:
         outline = item.geometry.outline
         self._rim = Rim(outline, radius, 1.5 * radius)
         self._fine = Rim(outline, radius, 0.01)
-        self._round = WayRound(outline, radius, s.clearance)
+        self._round = WayRound(outline, radius, s.clearance, s.slide)
         self._lever = float(np.hypot(*self._fine.points.T).max())
         self._surface = item.limit_surface()
         self._pushing = False
+        self._hold_since = self._settled = math.inf  # [s] of time
+        self._begun_with = 1.0
 
     def reset(self) -> None:
         """See SwarmLaw."""
-        self._pushing = False
+        self._pushing, self._hold_since, self._settled = False, math.inf, math.inf
 
     def step(self, scene: Scene) -> SwarmStep:
         """See SwarmLaw."""
         s, pose = self.settings, scene.pose
         twist = self._twist(pose, scene.target)
         local = se2.transform(se2.inverse(pose), scene.robots)
-        lacking, held = self._lacking(local, twist)
-        self._pushing = lacking <= (s.lost if self._pushing else s.hold)
+        lacking, held, ahead = self._lacking(local, twist)
+        self._look_for_hold(scene.time, lacking, bool(ahead.any()))
         off = -s.press if self._pushing else s.wait
         density = crescent(self._rim, pose, twist, off, s.least)
         centroids = self._coverage.centroids(scene.robots, density)
-        goals = se2.transform(se2.inverse(pose), centroids)
+        goals = self._at_rim(se2.transform(se2.inverse(pose), centroids), off)
         aims, length = self._way_round(scene).aims(local, goals)
         near = length < 3.0 * self._radius
+        self._settled = min(self._settled, scene.time) if near.all() else math.inf
         phase = self._phase(near, held, local)
         moved = self._towards(aims - local, length)
         if self._pushing:
+            moved = np.where(held[:, None], self._pressed(local, goals), moved)
             moved += rigid(twist, local)
-        moved = moved @ se2.rotation_matrix(float(pose[2])).T
-        return SwarmStep(moved, density, centroids, phase)
+        inward, most = self._bounds(local, twist, held)
+        world = se2.rotation_matrix(float(pose[2])).T
+        return SwarmStep(moved @ world, density, centroids, phase, inward @ world, most)
+
+    def _at_rim(self, goals: Array, off: float) -> Array:
+        """Centroids ``(n, 2)`` of few robots' parts of the crescent lie behind its line, in the
+        object, where no way leads to: they are moved out to it."""
+        k, depth = self._fine.nearest(goals)
+        excess = np.maximum(depth + off, 0.0)
+        moved: Array = goals - excess[:, None] * self._fine.normals[k]
+        return moved
+
+    def _look_for_hold(self, now: float, lacking: float, ahead: bool) -> None:
+        """Begin to push as soon as there is hold and nobody in front, or stop for want of it."""
+        s = self.settings
+        if self._pushing:
+            self._pushing = lacking <= max(s.lost, self._begun_with + _WORSE)
+            self._settled = self._hold_since = math.inf
+            return
+        # Those who are all there and have no better hold push with what they have.
+        enough = lacking <= s.hold or (now - self._settled > s.patience and lacking < 1.0)
+        self._hold_since = min(self._hold_since, now) if enough else math.inf
+        self._pushing = enough and (not ahead or now - self._hold_since > s.patience)
+        self._begun_with = lacking
 
     def _way_round(self, scene: Scene) -> WayRound:
         """Round the object, and round what stands at it."""
@@ -102,17 +135,16 @@ class CrescentLaw:
         close = local[away - local[:, 2] < room]
         if not len(close):
             return self._round
-        return WayRound(self._item.geometry.outline, self._radius, self.settings.clearance, close)
+        s, outline = self.settings, self._item.geometry.outline
+        return WayRound(outline, self._radius, s.clearance, s.slide, close)
 
     def _twist(self, pose: Array, target: Array) -> Array:
-        """``(3,)`` that the object is to have, in its frame."""
+        """``(3,)`` that the object is to have, in its frame: straight ahead, turning as it goes."""
         s = self.settings
-        if math.isnan(target[2]):
-            c, sn = math.cos(pose[2]), math.sin(pose[2])
-            x, y = target[:2] - pose[:2]
-            motion = np.array([c * x + sn * y, -sn * x + c * y, 0.0])
-        else:
-            motion = screw_between(pose, target)
+        c, sn = math.cos(pose[2]), math.sin(pose[2])
+        x, y = target[:2] - pose[:2]
+        turn = 0.0 if math.isnan(target[2]) else se2.wrap(float(target[2] - pose[2]))
+        motion = np.array([c * x + sn * y, -sn * x + c * y, turn])
         way = math.hypot(motion[0], motion[1]) + self._lever * abs(motion[2])
         if way < 1e-9:
             return np.zeros(3)
@@ -120,18 +152,17 @@ class CrescentLaw:
         twist: Array = pace * motion / way
         return twist
 
-    def _lacking(self, local: Array, twist: Array) -> tuple[float, Mask]:
-        """Part of the wrench that a twist takes which robots at the object cannot make, and who
-        ``(n,)`` is there and where the object is pushed from."""
+    def _lacking(self, local: Array, twist: Array) -> tuple[float, Mask, Mask]:
+        """Part of the wrench that a twist takes which robots at the object cannot make; who
+        ``(n,)`` is there and where the object is pushed from, and who where it goes to."""
         s, rim = self.settings, self._fine
-        away = np.hypot(*(local[:, None] - rim.points[None]).transpose(2, 0, 1))
-        k = away.argmin(axis=1)
-        approach = rim.approach(twist)
-        inward = ((local - rim.points[k]) * rim.normals[k]).sum(axis=1)
-        near = (away[np.arange(len(k)), k] < s.contact) | (inward > 0.0)
-        held: Mask = near & (approach[k] > 0.5 * s.least * max(float(approach.max()), 1e-12))
+        k, depth = rim.nearest(local)
+        approach, near = rim.approach(twist), depth > -s.contact
+        some = 0.5 * s.least * max(float(approach.max()), 1e-12)
+        held: Mask = near & (approach[k] > some)
+        ahead: Mask = near & (approach[k] < -some)
         if not held.any() or not twist.any():
-            return 1.0, held
+            return 1.0, held, ahead
         normals = rim.normals[k[held]]
         points = rim.points[k[held]] + self._radius * normals
         scale = np.array([1.0, 1.0, self._surface.radius])
@@ -140,7 +171,7 @@ class CrescentLaw:
         edges = np.array([cone_edges(n, self._item.contact_friction) for n in normals])
         G = grasp_matrix(points) / scale[:, None]
         columns = np.einsum("ikj,ilj->kil", G.reshape(3, -1, 2).transpose(1, 0, 2), edges)
-        return float(nnls(columns.reshape(3, -1), wrench)[1]), held
+        return float(nnls(columns.reshape(3, -1), wrench)[1]), held, ahead
 
     def _towards(self, way: Array, length: Array) -> Array:
         """Velocities ``(n, 2)`` [m/s] along ways that are so long [m] altogether."""
@@ -148,6 +179,26 @@ class CrescentLaw:
         speed = np.minimum(self.settings.gain * np.maximum(length, away), self._speed)
         moved: Array = way * (speed / np.maximum(away, 1e-9))[:, None]
         return moved
+
+    def _pressed(self, local: Array, goals: Array) -> Array:
+        """Velocities ``(n, 2)`` [m/s] of robots at the object towards their places, besides that of
+        the object: along its rim only slowly, for wheels that slip aside do not push."""
+        k, _ = self._fine.nearest(local)
+        normals, way = self._fine.normals[k], goals - local
+        inward = (way * normals).sum(axis=1)[:, None] * normals
+        speeds: Array = self.settings.gain * inward + self.settings.shift * (way - inward)
+        return speeds
+
+    def _bounds(self, local: Array, twist: Array, held: Mask) -> tuple[Array, Array]:
+        """Inward normals ``(n, 2)`` and how fast ``(n,)`` [m/s] robots may go along them: as fast
+        as the object flees, and by so much of the gap that may close. Only those that push may
+        press; whoever leans on others does not press through them."""
+        s = self.settings
+        k, depth = self._fine.nearest(local)
+        fleeing = self._fine.approach(twist)[k] if self._pushing else np.zeros(len(k))
+        room = np.where(held & self._pushing, s.press, -s.wait)
+        most = np.where(depth > -_REACH, fleeing + s.gain * (room - depth), np.inf)
+        return self._fine.normals[k], most
 
     def _phase(self, near: Mask, held: Mask, local: Array) -> SwarmPhase:
         if self._pushing:

@@ -40,12 +40,16 @@ class Scene:
 @dataclass(frozen=True)
 class SwarmStep:
     """velocities ``(n, 2)`` [m/s] of the robots; density that they cover; centroids ``(n, 2)`` [m]
-    of their cells; phase of the swarm."""
+    of their cells; phase of the swarm. inward ``(n, 2)`` unit, most ``(n,)`` [m/s]: directions in
+    which robots may go no faster, for the object is there; inf where they may.
+    """
 
     velocities: Array
     density: Density
     centroids: Array
     phase: SwarmPhase
+    inward: Array
+    most: Array
 
 
 class SwarmLaw(Protocol):

@@ -1,6 +1,7 @@
 """The line on which the centres of round robots lie that touch an object's convex hull."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from push_model.arrays import Array
 from push_model.outlines import convex_hull
@@ -33,6 +34,13 @@ class Rim:
         step = np.diff(ring, axis=0)[k]
         normal = np.column_stack([-step[:, 1], step[:, 0]])
         self.normals = normal / np.hypot(*normal.T)[:, None]
+
+    def nearest(self, points: Array) -> tuple[NDArray[np.int64], Array]:
+        """Which of the rim's points ``(n,)`` is the nearest to each of ``(n, 2)``, and how far
+        ``(n,)`` [m] these lie inward of it, negative outside."""
+        k = np.hypot(*(points[:, None] - self.points[None]).transpose(2, 0, 1)).argmin(axis=1)
+        depth: Array = ((points - self.points[k]) * self.normals[k]).sum(axis=1)
+        return k, depth
 
     def approach(self, twist: Array) -> Array:
         """``(m,)`` [m/s] at which the points flee inward when the object moves with a twist

@@ -17,27 +17,36 @@ _SWEEPS = 8
 
 
 def keep_apart(
-    velocities: Array, points: Array, radii: Array, gap: float, rate: float, reach: float
+    velocities: Array,
+    points: Array,
+    radii: Array,
+    gap: float,
+    rate: float,
+    reach: float,
+    bounds: Array | None = None,
 ) -> Array:
     """Velocities ``(n, 2)`` [m/s] of the first n bodies at ``(m, 2)`` [m], changed; further bodies
     stand.
 
     radii: ``(m,)`` [m]. gap: [m] between bodies that is kept. rate: [1/s] of the gap beyond it that
-    may close. reach: [m] of gaps up to which pairs are looked at.
+    may close. reach: [m] of gaps up to which pairs are looked at. bounds: ``(n, 3)`` a unit vector
+    for each robot and how fast [m/s] it may go along it.
     """
     moved = np.zeros((len(points), 2))
     moved[: len(velocities)] = velocities
-    if len(points) > 1:
+    if bounds is None:
+        bounds = np.column_stack([0.0 * velocities, np.full(len(velocities), np.inf)])
+    if len(velocities):
         order = np.argsort(points[:, 0], kind="stable")
         points, radii = np.ascontiguousarray(points), np.ascontiguousarray(radii)
-        _part(moved, len(velocities), points, radii, order, gap, rate, reach)
+        _part(moved, len(velocities), points, radii, order, gap, rate, reach, bounds)
     return moved[: len(velocities)]
 
 
 @numba.njit(cache=True, error_model="numpy")
 def _part(
     moved: Any, count: int, points: Any, radii: Any, order: Any, gap: float, rate: float,
-    reach: float,
+    reach: float, bounds: Any,
 ) -> None:  # fmt: skip
     n, widest = order.shape[0], radii.max()
     for _ in range(_SWEEPS):
@@ -69,5 +78,11 @@ def _part(
                 if j < count:
                     moved[j, 0] += part * excess * ux
                     moved[j, 1] += part * excess * uy
+        for i in range(count):
+            excess = moved[i, 0] * bounds[i, 0] + moved[i, 1] * bounds[i, 1] - bounds[i, 2]
+            if excess > 0.0:
+                most = max(most, excess)
+                moved[i, 0] -= excess * bounds[i, 0]
+                moved[i, 1] -= excess * bounds[i, 1]
         if most < 1e-4:
             break

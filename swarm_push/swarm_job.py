@@ -156,21 +156,22 @@ class SwarmJob:
         fixed = np.vstack([np.array(still).reshape(-1, 3), others])
         self.last = step = self._law.step(Scene(now, pose, poses[:, :2], target, fixed))
         self.state, self.reason = _STATES[step.phase]
-        velocities = self._spaced(step.velocities, poses[:, :2], fixed)
+        velocities = self._spaced(step, poses[:, :2], fixed)
         twists = self._drive.follow(velocities, poses[:, 2], self.settings.lead)
         touched = self._touched(pose, poses[:, :2], fixed)
         self._look_for_dead(now, names, poses, twists, touched)
         told = {n: (float(v), float(w)) for n, (v, w) in zip(names, twists, strict=True)}
         return {n: told.get(n, (0.0, 0.0)) for n in robots}
 
-    def _spaced(self, velocities: Array, points: Array, fixed: Array) -> Array:
+    def _spaced(self, step: SwarmStep, points: Array, fixed: Array) -> Array:
         s, speed = self.settings, self._drive.max_speed
         bodies = np.vstack([points, fixed[:, :2]])
         radii = np.concatenate([np.full(len(points), self._radius), fixed[:, 2]])
-        slowed = _limited(velocities, speed)
-        return _limited(
-            keep_apart(slowed, bodies, radii, s.apart, s.closing, speed / s.closing), speed
-        )
+        slowed = _limited(step.velocities, speed)
+        bounds = np.column_stack([step.inward, step.most])
+        reach = speed / s.closing
+        apart = keep_apart(slowed, bodies, radii, s.apart, s.closing, reach, bounds)
+        return _limited(apart, speed)
 
     def _reached(self, now: float, pose: Array) -> bool:
         """Whether the job is over; a target that is reached makes room for the next."""

@@ -48,7 +48,9 @@ class ThesisLaw:
         density = tangential(mean + s.lead * u, item, s.sigma_x or x, s.sigma_y or y)
         centroids = self._coverage.centroids(robots, density)
         phase = self._phase(mean - item, direction)
-        return SwarmStep(s.gain * (centroids - robots), density, centroids, phase)
+        free = np.full(len(robots), np.inf)
+        velocities = s.gain * (centroids - robots)
+        return SwarmStep(velocities, density, centroids, phase, np.zeros((len(robots), 2)), free)
 
     def _phase(self, d: Array, direction: Array) -> SwarmPhase:
         away = float(np.hypot(*d))

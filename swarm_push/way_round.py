@@ -19,16 +19,22 @@ class WayRound:
     """Of round robots about one object."""
 
     def __init__(
-        self, outline: Array, radius: float, clearance: float, others: Array | None = None
+        self,
+        outline: Array,
+        radius: float,
+        clearance: float,
+        slide: float,
+        others: Array | None = None,
     ) -> None:
         """outline: ``(k, 2)`` [m] about the centre of mass. clearance: [m] that robots keep from
-        the object as they go round it. others: ``(k, 3)`` x, y, radius [m] of what stands at the
+        the object as they go round it. slide: [m] into the object that one which slides
+        along it may head. others: ``(k, 3)`` x, y, radius [m] of what stands at the
         object, in its frame; robots go round both together."""
         self._radius = radius
         whole = outline if others is None else np.vstack([outline, *map(_disc, others)])
         self._way = Rim(whole, radius + clearance, 0.05).points
         self._keep = Rim(whole, radius + 0.6 * clearance, 0.02).points
-        self._core = Rim(outline, 0.7 * radius, 0.02).points
+        self._core = Rim(outline, radius - slide, 0.02).points
 
     def aims(self, robots: Array, goals: Array) -> tuple[Array, Array]:
         """Where robots ``(n, 2)`` [m] head for on their ways to goals ``(n, 2)``, and how far
