@@ -17,6 +17,7 @@ NAMES = (
     "lockstep",
     "physics",
     "stable-push",
+    "swarm",
     "worlds",
 )
 """Modules of this package with a ``run``; a dash for each underscore."""

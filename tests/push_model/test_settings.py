@@ -21,6 +21,9 @@ from push_planner.settings import PlannerSettings
 from push_supervisor.settings import SupervisorSettings
 from sim_bridge.planar_world import PlanarSettings
 from sim_bridge.settings import BridgeSettings, MotionCaptureSettings, PhysicsSettings
+from swarm_push.crescent_law import CrescentLawSettings
+from swarm_push.swarm_job import SwarmJobSettings
+from swarm_push.thesis_law import ThesisLawSettings
 
 ALL = (
     PoseGateSettings,
@@ -38,6 +41,9 @@ ALL = (
     PlacementSettings,
     GroupControlSettings,
     GroupPushSettings,
+    SwarmJobSettings,
+    CrescentLawSettings,
+    ThesisLawSettings,
 )
 
 

@@ -41,6 +41,7 @@ def names(cell):
 
 
 GROUP_NODES = {"group": ("group", "/"), "optimizer": ("optimizer", "/")}
+SWARM_NODES = {"swarm": ("swarm", "/")}
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +50,7 @@ def graph():
     return {
         **look(load_scenario("short"), "single", NODES),
         **look(load_scenario("group-ellipse"), "group", GROUP_NODES),
+        **look(load_scenario("swarm-square"), "swarm", SWARM_NODES),
     }
 
 
@@ -81,10 +83,10 @@ def look(scenario, system, nodes):
 
 
 def test_every_node_has_a_row_and_no_other():
-    assert {row[0] for row in table("node")[:6]} == {*NODES, *GROUP_NODES}
+    assert {row[0] for row in table("node")[:7]} == {*NODES, *GROUP_NODES, *SWARM_NODES}
 
 
-@pytest.mark.parametrize("node", [*NODES, *GROUP_NODES])
+@pytest.mark.parametrize("node", [*NODES, *GROUP_NODES, *SWARM_NODES])
 def test_what_a_node_hears_tells_serves_and_asks(graph, node):
     (row,) = [r for r in table("node") if r[0] == node]
     for cell, actual in zip(row[1:], graph[node], strict=True):
@@ -99,6 +101,8 @@ def test_settings_and_their_defaults_exist():
     from push_planner import PlannerSettings
     from push_supervisor import SupervisorSettings
     from sim_bridge.settings import BridgeSettings, MotionCaptureSettings
+    from swarm_push.laws import LawSettings
+    from swarm_push.swarm_job import SwarmJobSettings
 
     known = {
         "bridge": (BridgeSettings(), {"motion_capture": MotionCaptureSettings()}),
@@ -110,6 +114,7 @@ def test_settings_and_their_defaults_exist():
         "supervisor": (SupervisorSettings(), {}),
         "group": (GroupJobSettings(), {"control": GroupControlSettings()}),
         "optimizer": (StepSettings(), {}),
+        "swarm": (SwarmJobSettings(), {"law": LawSettings()}),
     }
     lines = (ROOT / "README.md").read_text().splitlines()
     start = next(i for i, line in enumerate(lines) if line.startswith("| node | parameter |"))
