@@ -39,6 +39,7 @@ GROUP_STATUS = (
 """Columns of a group's status, see push_msgs/GroupStatus."""
 
 _SPACING = 0.02  # [s] least, between frames that are kept
+_MOMENTS = 2.0  # [s] between messages of a swarm that are kept whole
 _MOVING = (1, 2)  # modes MOVE and PUSH of ControllerStatus
 
 
@@ -68,9 +69,18 @@ class GroupPushes:
 
 
 @dataclass
+class SwarmTicks:
+    """What a swarm told: rows of time [s], position error [m], orientation error [rad], CPU [s] and
+    phase; and whole messages, push_msgs/SwarmStatus, every few seconds."""
+
+    rows: list[tuple[float, float, float, float, str]] = field(default_factory=list)
+    moments: list[Any] = field(default_factory=list)
+
+
+@dataclass
 class Job:
     """What a team did. goal ``(3,)``: the last one; plan: ``(n, 2)`` [m] of each push's axle, or of
-    the object that a group pushes; pushes: of a group."""
+    the object that a group pushes; pushes: of a group; swarm: of a swarm."""
 
     space: str
     system: str = ""
@@ -80,6 +90,7 @@ class Job:
     goal: Array | None = None
     plan: list[Array] = field(default_factory=list)
     pushes: list["GroupPushes"] = field(default_factory=list)
+    swarm: SwarmTicks = field(default_factory=SwarmTicks)
 
 
 @dataclass
@@ -180,6 +191,7 @@ def load(bag: Path) -> BagContents:
         "push_plan",
         "group_plan",
         "group_status",
+        "swarm_status",
         "contacts",
         "controller/status",
     )
@@ -203,6 +215,8 @@ def load(bag: Path) -> BagContents:
                 job.pushes.append(GroupPushes(tuple(m.pushers), 0.0))
             elif record.topic.endswith("/group_status"):
                 _take_group_status(job, m)
+            elif record.topic.endswith("/swarm_status"):
+                _take_swarm_status(job.swarm, m)
             else:
                 job.plan = [np.column_stack([s.trajectory.x, s.trajectory.y]) for s in m.segments]
     contents.time, contents.poses = frames.finish()
@@ -210,6 +224,21 @@ def load(bag: Path) -> BagContents:
         table = np.array(rows, dtype=np.float64)
         contents.status[robot] = dict(zip(STATUS, table.T, strict=True))
     return contents
+
+
+def _take_swarm_status(swarm: SwarmTicks, message: Any) -> None:
+    time = _seconds(message.header.stamp)
+    swarm.rows.append(
+        (
+            time,
+            float(message.position_error),
+            float(message.orientation_error),
+            float(message.solve_time),
+            str(message.phase),
+        )
+    )
+    if not swarm.moments or time - _seconds(swarm.moments[-1].header.stamp) >= _MOMENTS:
+        swarm.moments.append(message)
 
 
 def _take_group_status(job: Job, message: Any) -> None:
