@@ -16,9 +16,10 @@ def run(arguments: argparse.Namespace) -> int:
     from grasp_opt.placement import Placer
     from push_mpc import LtvMpc, MpcSettings, TrackerSettings, TrajectoryTracker
     from push_planner import PlannerSettings, PushPlanner
-    from push_scenario.bodies import load_object
+    from push_scenario.bodies import load_object, load_robot
     from push_scenario.scenario import load_scenario
     from sim_bridge.planar_world import PlanarWorld
+    from swarm_push.swarm_job import SwarmJob
 
     print("compiling the numerical kernels")
     scenario = load_scenario("env1-target1")
@@ -35,4 +36,6 @@ def run(arguments: argparse.Namespace) -> int:
     composed_quality(contacts.points, contacts.normals)
     extension(contacts.points)
     modified_hausdorff(np.ones((1, 3, 3)), np.ones((1, 3)))
+    room = np.array([[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]])
+    SwarmJob(room, load_object("swarm_square"), load_robot("epuck_ring")).warm_up()
     return 0

@@ -211,6 +211,7 @@ class SwarmNode(Node):
         self.job = None
         if region is not None:
             self.job = SwarmJob(region, self._item, self._robot, self._settings, self._laws)
+            self.job.warm_up()
         self._look_after_job()
 
     def _on_frame(self, frame: Frame) -> None:

@@ -85,6 +85,16 @@ class SwarmJob:
         self._nearest = math.inf
         self._progress = self._seen = 0.0
 
+    def warm_up(self) -> None:
+        """Load what is compiled, so that the first command does not wait."""
+        middle = self.region.mean(axis=0)
+        robots = {str(i): np.array([*(middle + [0.3 * i - 0.6, 0.0]), 0.0]) for i in range(3)}
+        self.begin([np.array([*(middle + 0.1), 0.0])])
+        self.step(0.0, np.array([*middle, 0.0]), robots, np.array([[*middle, 0.01]]))
+        self.end(JobError.NONE, "waiting for a goal")
+        self.targets, self.taking_part = (), ()
+        self._law.reset()
+
     @property
     def busy(self) -> bool:
         """Whether a job is under way."""

@@ -222,3 +222,10 @@ def test_a_patient_law_waits_for_who_is_in_front():
             if job.state is JobPhase.PUSHING and when is None:
                 when = 0.02 * k
         assert when == pytest.approx(begins, abs=0.05)
+
+
+def test_warming_up_leaves_no_trace():
+    job = job_of(load_object("swarm_square"))
+    job.warm_up()
+    assert not job.busy and job.error is JobError.NONE and job.target is None
+    assert job.last is None and not job.dead and job.index == 0
