@@ -25,6 +25,7 @@ from push_model.arrays import Array, Mask
 from push_model.coulomb import cone_edges
 from push_model.grasp import grasp_matrix
 from push_model.limit_surface import EllipsoidLimitSurface
+from push_model.screws import point_velocities
 from push_model.settings import bounded, settings
 
 _SQUARES = 1e-3  # weight of forces beside the wrench that they lack
@@ -129,7 +130,7 @@ class GroupController:
     def ahead(self, twist: Array) -> Array:
         """``(n, 2)`` unit directions of the robots at their places as the object begins to move
         with a twist ``(3,)``, in its frame."""
-        directions = rigid(twist, self.places)
+        directions = point_velocities(twist, self.places)
         unit: Array = directions / np.hypot(*directions.T)[:, None]
         return unit
 
@@ -171,7 +172,7 @@ class GroupController:
             moved = off_place + s.force_gain * forces
         else:
             normals = contacts.normals
-            moved = rigid(self._feasible(made, task), local)
+            moved = point_velocities(self._feasible(made, task), local)
             moved += off_place - (off_place * normals).sum(axis=1)[:, None] * normals
             moved += self._inward(gaps, forces, normals, touching)[:, None] * normals
         self._keep_apart(moved, local)
@@ -218,12 +219,6 @@ class GroupController:
         pace = min(self.settings.correction, size / self.surface.max_force) * speed
         twist: Array = pace * scaled / size / scale
         return twist
-
-
-def rigid(twist: Array, points: Array) -> Array:
-    """Velocities ``(n, 2)`` [m/s] of points ``(n, 2)`` [m] of a body that moves with a twist, all
-    in its frame."""
-    return np.column_stack([twist[0] - twist[2] * points[:, 1], twist[1] + twist[2] * points[:, 0]])
 
 
 def _into(heading: float, twist: Array) -> Array:

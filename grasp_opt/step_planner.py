@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_opt.contact_outline import ContactOutline
-from grasp_opt.group_control import rigid
 from grasp_opt.marshal import LEAST_BACK, Marshal, Move, NoStep, standoffs
 from grasp_opt.object_trajectory import ObjectTrajectory, screw
 from grasp_opt.object_way import NoObjectWay, WayFinder, pieces
@@ -24,7 +23,7 @@ from push_model import se2
 from push_model.arrays import Array, Mask
 from push_model.free_space import FreeSpace, Obstacles
 from push_model.occupancy import OccupancyGrid
-from push_model.screws import screw_between, screw_poses
+from push_model.screws import point_velocities, screw_between, screw_poses
 from push_model.settings import bounded, settings
 from push_model.specs import ObjectSpec, RobotSpec
 from push_model.traction import lift_share, push_force, standing_traction
@@ -319,7 +318,7 @@ class StepPlanner:
         def free(way: Array) -> Mask:
             contacts = self._outline.at(way)
             centres = contacts.centres(self._radius)
-            ahead = rigid(twist, centres)
+            ahead = point_velocities(twist, centres)
             ahead /= np.maximum(1e-9, np.hypot(*ahead.T))[:, None]
             off = standoffs(contacts.normals, ahead, s.standoff) + LEAST_BACK * s.back
             met = se2.transform(pose, centres - off * ahead)
@@ -368,7 +367,7 @@ class StepPlanner:
         left: int,
     ) -> GroupPlan:
         s, centres = self.settings, placement.contacts.centres(self._radius)
-        ahead = rigid(trajectory.first_twist, centres)
+        ahead = point_velocities(trajectory.first_twist, centres)
         ahead /= np.hypot(*ahead.T)[:, None]
         normals = placement.contacts.normals
         met = se2.transform(pose, centres - standoffs(normals, ahead, s.standoff) * ahead)

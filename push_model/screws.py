@@ -8,6 +8,12 @@ from push_model import se2
 from push_model.arrays import Array
 
 
+def point_velocities(twist: Array, points: Array) -> Array:
+    """Velocities ``(n, 2)`` [m/s] of points ``(n, 2)`` [m] of a body with a twist ``(3,)``, all in
+    its frame."""
+    return np.column_stack([twist[0] - twist[2] * points[:, 1], twist[1] + twist[2] * points[:, 0]])
+
+
 def screw_poses(start: Array, motion: Array, part: Array) -> Array:
     """Poses ``(k, 3)`` after parts ``(k,)`` of a motion with one twist, headings continuous."""
     angle = motion[2] * part

@@ -7,10 +7,10 @@ exactly. Nobody looks at the object on the way: what is off at the beginning sta
 import numpy as np
 
 from grasp_opt.contact_outline import ContactOutline
-from grasp_opt.group_control import rigid
 from grasp_opt.object_trajectory import ObjectTrajectory
 from push_model import se2
 from push_model.arrays import Array
+from push_model.screws import point_velocities
 from push_model.specs import ObjectSpec, RobotSpec
 from push_mpc.controller import Reference
 from push_mpc.ltv_mpc import LtvMpc
@@ -69,7 +69,7 @@ def _way(trajectory: ObjectTrajectory, place: Array) -> Array:
     """``(n, 5)`` x, y, heading [rad] along the way, v, omega of a point fixed to the object."""
     poses = trajectory.pose
     points = np.array([se2.transform(pose, place) for pose in poses])
-    local = np.array([rigid(twist, place[None])[0] for twist in trajectory.body_twists])
+    local = np.array([point_velocities(twist, place[None])[0] for twist in trajectory.body_twists])
     speed = np.hypot(*local.T)
     moving = np.flatnonzero(speed > _RESTING)
     direction = np.arctan2(local[moving, 1], local[moving, 0]) + poses[moving, 2]

@@ -17,12 +17,13 @@ from push_model import se2
 from push_model.arrays import Array, Mask
 from push_model.coulomb import cone_edges
 from push_model.grasp import grasp_matrix
+from push_model.screws import point_velocities
 from push_model.settings import bounded, settings
 from push_model.specs import ObjectSpec
 from swarm_push.coverage import Coverage
 from swarm_push.crescent import crescent
 from swarm_push.law import Scene, SwarmPhase, SwarmStep
-from swarm_push.rim import Rim
+from swarm_push.rim import Nearest, Rim
 from swarm_push.way_round import WayRound
 
 _REACH = 0.1  # [m] of gaps to the object that are looked at
@@ -85,21 +86,22 @@ class CrescentLaw:
         s, pose = self.settings, scene.pose
         twist = self._twist(pose, scene.target)
         local = se2.transform(se2.inverse(pose), scene.robots)
-        lacking, held, ahead = self._lacking(local, twist)
+        near = self._fine.nearest(local)
+        lacking, held, ahead = self._lacking(near, twist)
         self._look_for_hold(scene.time, lacking, bool(ahead.any()))
         off = -s.press if self._pushing else s.wait
         density = crescent(self._rim, pose, twist, off, s.least)
         centroids = self._coverage.centroids(scene.robots, density)
         goals = self._at_rim(se2.transform(se2.inverse(pose), centroids), off)
         aims, length = self._way_round(scene).aims(local, goals)
-        near = length < 3.0 * self._radius
-        self._settled = min(self._settled, scene.time) if near.all() else math.inf
-        phase = self._phase(near, held, local)
+        arrived = length < 3.0 * self._radius
+        self._settled = min(self._settled, scene.time) if arrived.all() else math.inf
+        phase = self._phase(arrived, held, local)
         moved = self._towards(aims - local, length)
         if self._pushing:
-            moved = np.where(held[:, None], self._pressed(local, goals), moved)
-            moved += rigid(twist, local)
-        inward, most = self._bounds(local, twist, held)
+            moved = np.where(held[:, None], self._pressed(near, goals - local), moved)
+            moved += point_velocities(twist, local)
+        inward, most = self._bounds(near, twist, held)
         world = se2.rotation_matrix(float(pose[2])).T
         return SwarmStep(moved @ world, density, centroids, phase, inward @ world, most)
 
@@ -152,11 +154,11 @@ class CrescentLaw:
         twist: Array = pace * motion / way
         return twist
 
-    def _lacking(self, local: Array, twist: Array) -> tuple[float, Mask, Mask]:
+    def _lacking(self, nearest: Nearest, twist: Array) -> tuple[float, Mask, Mask]:
         """Part of the wrench that a twist takes which robots at the object cannot make; who
         ``(n,)`` is there and where the object is pushed from, and who where it goes to."""
         s, rim = self.settings, self._fine
-        k, depth = rim.nearest(local)
+        k, depth = nearest
         approach, near = rim.approach(twist), depth > -s.contact
         some = 0.5 * s.least * max(float(approach.max()), 1e-12)
         held: Mask = near & (approach[k] > some)
@@ -180,36 +182,29 @@ class CrescentLaw:
         moved: Array = way * (speed / np.maximum(away, 1e-9))[:, None]
         return moved
 
-    def _pressed(self, local: Array, goals: Array) -> Array:
-        """Velocities ``(n, 2)`` [m/s] of robots at the object towards their places, besides that of
-        the object: along its rim only slowly, for wheels that slip aside do not push."""
-        k, _ = self._fine.nearest(local)
-        normals, way = self._fine.normals[k], goals - local
+    def _pressed(self, nearest: Nearest, way: Array) -> Array:
+        """Velocities ``(n, 2)`` [m/s] of robots at the object on ways to their places, besides that
+        of the object: along its rim only slowly, for wheels that slip aside do not push."""
+        normals = self._fine.normals[nearest[0]]
         inward = (way * normals).sum(axis=1)[:, None] * normals
         speeds: Array = self.settings.gain * inward + self.settings.shift * (way - inward)
         return speeds
 
-    def _bounds(self, local: Array, twist: Array, held: Mask) -> tuple[Array, Array]:
+    def _bounds(self, nearest: Nearest, twist: Array, held: Mask) -> tuple[Array, Array]:
         """Inward normals ``(n, 2)`` and how fast ``(n,)`` [m/s] robots may go along them: as fast
         as the object flees, and by so much of the gap that may close. Only those that push may
         press; whoever leans on others does not press through them."""
         s = self.settings
-        k, depth = self._fine.nearest(local)
+        k, depth = nearest
         fleeing = self._fine.approach(twist)[k] if self._pushing else np.zeros(len(k))
         room = np.where(held & self._pushing, s.press, -s.wait)
         most = np.where(depth > -_REACH, fleeing + s.gain * (room - depth), np.inf)
         return self._fine.normals[k], most
 
-    def _phase(self, near: Mask, held: Mask, local: Array) -> SwarmPhase:
+    def _phase(self, arrived: Mask, held: Mask, local: Array) -> SwarmPhase:
         if self._pushing:
             return SwarmPhase.PUSH
-        if held.any() and (near | held).all():
+        if held.any() and (arrived | held).all():
             return SwarmPhase.REALIGN
         far = np.hypot(*local.T) > 2.0 * self._lever
         return SwarmPhase.GATHER if far.mean() > 0.5 else SwarmPhase.GO_ROUND
-
-
-def rigid(twist: Array, points: Array) -> Array:
-    """Velocities ``(n, 2)`` [m/s] of points ``(n, 2)`` [m] of a body that moves with a twist, all
-    in its frame."""
-    return np.column_stack([twist[0] - twist[2] * points[:, 1], twist[1] + twist[2] * points[:, 0]])

@@ -8,6 +8,10 @@ from push_model.outlines import convex_hull
 
 _DIRECTIONS = 720
 
+Nearest = tuple[NDArray[np.int64], Array]
+"""Which of a rim's points ``(n,)`` is the nearest to each of some others, and how far ``(n,)`` [m]
+these lie inward of it, negative outside."""
+
 
 class Rim:
     """Points at even distances along that line, in the object's frame.
@@ -35,9 +39,8 @@ class Rim:
         normal = np.column_stack([-step[:, 1], step[:, 0]])
         self.normals = normal / np.hypot(*normal.T)[:, None]
 
-    def nearest(self, points: Array) -> tuple[NDArray[np.int64], Array]:
-        """Which of the rim's points ``(n,)`` is the nearest to each of ``(n, 2)``, and how far
-        ``(n,)`` [m] these lie inward of it, negative outside."""
+    def nearest(self, points: Array) -> Nearest:
+        """Of points ``(n, 2)`` [m]."""
         k = np.hypot(*(points[:, None] - self.points[None]).transpose(2, 0, 1)).argmin(axis=1)
         depth: Array = ((points - self.points[k]) * self.normals[k]).sum(axis=1)
         return k, depth

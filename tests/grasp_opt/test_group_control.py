@@ -11,11 +11,11 @@ from grasp_opt.group_control import (
     GroupController,
     GroupControlSettings,
     distribute,
-    rigid,
 )
 from push_model import se2
 from push_model.coulomb import cone_edges
 from push_model.grasp import grasp_matrix
+from push_model.screws import point_velocities
 from push_scenario.bodies import load_object, load_robot
 
 ITEM, ROBOT = load_object("plate_ellipse"), load_robot("epuck_ring")
@@ -87,7 +87,7 @@ def test_on_its_way_the_group_moves_as_one_body_with_the_task():
         twist = np.append(se2.rotation_matrix(pose[2]) @ body[:2], body[2])
         robots = se2.transform(pose, group.places)
         command = group.command(pose, twist, pose.copy(), twist, robots)
-        expected = rigid(body, group.places) @ se2.rotation_matrix(pose[2]).T
+        expected = point_velocities(body, group.places) @ se2.rotation_matrix(pose[2]).T
         assert command.lacking < 0.01
         assert command.velocities == pytest.approx(expected, abs=3e-3)
         assert command.gaps == pytest.approx(np.zeros(3), abs=1e-3)
