@@ -1,4 +1,4 @@
-"""What every law of a swarm offers, and what the laws are called.
+"""What every law of a swarm sees and says.
 
 A law sees where the object and the robots are and says how fast each robot is to go, and over which
 density the swarm spreads. It is written for robots that go in any direction.

@@ -15,7 +15,7 @@ from swarm_push.thesis_law import ThesisLaw, ThesisLawSettings
 class LawSettings:
     """Which law moves a swarm."""
 
-    law: Literal["crescent", "thesis"] = bounded("crescent", doc="as printed, or ours")
+    law: Literal["crescent", "thesis"] = bounded("crescent", doc="ours, or as printed")
 
 
 @dataclass(frozen=True)

@@ -294,6 +294,19 @@ class SwarmNode(Node):
             step_count=count,
         )
         self.get_logger().info(f"{state.name}: {reason}")
+        if job is not None and job.busy:
+            away, _ = job.errors(self._pose)
+            told = {"state_name": state.name}
+            self._moves.feedback(SwarmMove.Feedback(target=index, position_error=away, **told))
+            self._intake.feedback(
+                MoveObject.Feedback(
+                    state=int(state),
+                    push_index=index,
+                    push_count=count,
+                    distance_to_goal=away,
+                    **told,
+                )
+            )
 
     def _finish(self) -> None:
         """Tell whoever waits how the job ended."""

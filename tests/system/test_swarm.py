@@ -59,12 +59,12 @@ def test_a_pose_is_reached_and_told(run):
         assert m.target_theta == pytest.approx(1.0) and math.isfinite(m.position_error)
 
 
-def move(run, x, y, theta=(), limit=400.0):
+def move(run, x, y, theta=(), limit=400.0, feedback=None):
     """What the action says of targets."""
     client = ActionClient(run.observer, SwarmMove, "/swarm_move")
     assert run.spinner.until(client.server_is_ready, 5.0)
     goal = SwarmMove.Goal(x=list(x), y=list(y), theta=list(theta))
-    sent = client.send_goal_async(goal)
+    sent = client.send_goal_async(goal, feedback.append if feedback is not None else None)
     assert run.spin_until(sent.done, 5.0) and sent.result().accepted
     answer = sent.result().get_result_async()
     assert run.spin_until(answer.done, limit)
@@ -72,9 +72,13 @@ def move(run, x, y, theta=(), limit=400.0):
 
 
 def test_targets_in_a_row_are_reached_without_headings(run):
-    result = move(run, [0.9, 0.0], [0.5, -0.5])
+    told = []
+    result = move(run, [0.9, 0.0], [0.5, -0.5], feedback=told)
     assert result.error_code == 0, result.error_msg
     assert len(result.times) == 2 and min(result.times) > 2.0
+    assert {m.feedback.target for m in told} == {0, 1}
+    assert {m.feedback.state_name for m in told} >= {"POSITIONING", "PUSHING"}
+    assert all(math.isfinite(m.feedback.position_error) for m in told)
     assert np.hypot(*(run.observer.trace.object[-1] - [0.0, -0.5, 0.0])[:2]) < 0.03
 
 
