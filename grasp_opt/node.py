@@ -334,14 +334,22 @@ class GroupNode(Node):
     def _publish_state(self) -> None:
         job = self.job
         pieces = job.pushes + max(0, job.left - (job.state is JobPhase.PUSHING))
+        state, name, index = int(job.state), job.state.name, max(0, job.pushes - 1)
+        progress = float(not job.busy) if not pieces else min(1.0, job.pushes / pieces)
+        if job.busy and job.goal is not None:
+            way = float(np.hypot(*(job.goal - self._pose)[:2]))
+            told = MoveObject.Feedback(state=state, state_name=name, distance_to_goal=way)
+            told.push_index, told.push_count = index, pieces
+            self._intake.feedback(told)
+            self._along.feedback(PushAlong.Feedback(state_name=name, progress=progress))
         self._intake.publish(
             self._poses.stamp,
-            state=int(job.state),
-            state_name=job.state.name,
+            state=state,
+            state_name=name,
             reason=job.reason,
             error_code=int(job.error),
-            progress=float(not job.busy) if not pieces else min(1.0, job.pushes / pieces),
-            step_index=max(0, job.pushes - 1),
+            progress=progress,
+            step_index=index,
             step_count=pieces,
             replans=job.replans,
         )

@@ -85,11 +85,17 @@ def along(run, task):
     client = ActionClient(run.observer, PushAlong, "/push_along")
     assert run.spinner.until(client.server_is_ready, 5.0)
     x, y, theta = task.pose.T.tolist()
-    sent = client.send_goal_async(PushAlong.Goal(time=task.time.tolist(), x=x, y=y, theta=theta))
+    goal = PushAlong.Goal(time=task.time.tolist(), x=x, y=y, theta=theta)
+    told = []
+    sent = client.send_goal_async(goal, told.append)
     assert run.spin_until(sent.done, 5.0) and sent.result().accepted
     answer = sent.result().get_result_async()
     assert run.spin_until(answer.done, 200.0)
-    return answer.result().result
+    result = answer.result().result
+    if not result.error_code:
+        assert {m.feedback.state_name for m in told} >= {"POSITIONING", "PUSHING"}
+        assert all(0.0 <= m.feedback.progress <= 1.0 for m in told)
+    return result
 
 
 def test_a_trajectory_is_followed_and_one_that_begins_elsewhere_refused(run):
