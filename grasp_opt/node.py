@@ -20,12 +20,12 @@ from grasp_opt.group_messages import plan_from_ros, status_to_ros, trajectory_fr
 from grasp_opt.group_push import GroupPushSettings
 from grasp_opt.moves import MoveSettings
 from grasp_opt.object_trajectory import ObjectTrajectory
-from grasp_opt.object_way import WayFinder
 from push_estimation.pose_gate import PoseGateSettings, Stamp
 from push_model import se2
 from push_model.arrays import Array
 from push_model.free_space import FreeSpace, Obstacles
 from push_model.jobs import GoalRefused, JobError, JobPhase
+from push_model.object_way import WayFinder
 from push_model.occupancy import OccupancyGrid as Grid
 from push_msgs.action import MoveObject, PlanGroupPush, PushAlong
 from push_msgs.msg import GroupStatus, Velocities

@@ -11,7 +11,6 @@ import numpy as np
 from grasp_opt.contact_outline import ContactOutline
 from grasp_opt.marshal import LEAST_BACK, Marshal, Move, NoStep, standoffs
 from grasp_opt.object_trajectory import ObjectTrajectory, screw
-from grasp_opt.object_way import NoObjectWay, WayFinder, pieces
 from grasp_opt.placement import (
     NoPlacement,
     Placement,
@@ -22,6 +21,7 @@ from grasp_opt.placement import (
 from push_model import se2
 from push_model.arrays import Array, Mask
 from push_model.free_space import FreeSpace, Obstacles
+from push_model.object_way import NoObjectWay, WayFinder, pieces
 from push_model.occupancy import OccupancyGrid
 from push_model.screws import point_velocities, screw_between, screw_poses
 from push_model.settings import bounded, settings

@@ -23,6 +23,7 @@ from sim_bridge.settings import BridgeSettings, MotionCaptureSettings, PhysicsSe
 from sim_bridge.worlds import world_kind
 from swarm_push.crescent_law import CrescentLawSettings
 from swarm_push.laws import LawSettings
+from swarm_push.object_track import TrackSettings
 from swarm_push.swarm_job import SwarmJobSettings
 from swarm_push.thesis_law import ThesisLawSettings
 
@@ -53,6 +54,7 @@ SECTIONS: dict[str, dict[str, type[Any]]] = {
         "law": LawSettings,
         "crescent": CrescentLawSettings,
         "thesis": ThesisLawSettings,
+        "track": TrackSettings,
         "poses": PoseGateSettings,
     },
     "torque_controller": {

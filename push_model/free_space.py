@@ -131,7 +131,8 @@ class Reach:
         lengths, before = dijkstra(whole, directed=False, indices=count, return_predecessors=True)
         self.lengths: Array = lengths[:-1]
         """``(k,)`` [m] of the ways to the places of the lattice; inf where there is none."""
-        self._before = before
+        self.before: NDArray[np.int64] = before
+        """``(k + 1,)`` the place before each on its way; no place's number at the start."""
 
     def _joined(self, point: Array) -> NDArray[np.int64]:
         """Places of the lattice that a point has a straight line to."""
@@ -165,7 +166,7 @@ class Reach:
         points = []
         while 0 <= place < len(self._space.places):
             points.append(self._space.places[place])
-            place = int(self._before[place])
+            place = int(self.before[place])
         return np.vstack([self._start, *points[::-1]])
 
     def _straight(self, points: Array) -> Array:

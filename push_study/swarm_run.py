@@ -1,7 +1,7 @@
 """One run of a swarm through targets, in any world, without ROS."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -85,24 +85,12 @@ def run(task: SwarmTask) -> Row:
     job = SwarmJob(region, item, robot, settings, laws)
     job.begin([np.array([*t, math.nan]) for t in task.targets])
     begin = starts(np.random.default_rng([task.seed, task.robots]), task.robots, item, radius)
-    doubt, ways, none = uncertainty(task.uncertainty), [], np.zeros((0, 3))
-    phases: dict[str, float] = {}
+    doubt = uncertainty(task.uncertainty)
     with GroupWorld(room, robot, begin, item, np.zeros(3), doubt, task.seed, task.world) as world:
-        tick = 0
-        while world.time < task.limit and job.busy:
-            seen, robots = world.see()
-            here = dict(zip(world.names, robots, strict=True))
-            twists = job.step(world.time, item.mass_pose(seen), here, none)
-            if job.last is not None:
-                name = job.last.phase.value
-                phases[name] = phases.get(name, 0.0) + TICK
-            if tick % _TRACE == 0:
-                ways.append(np.vstack([*world.truth()]))
-            world.step(np.array([twists[n] for n in world.names]))
-            tick += 1
+        ways, phases = drive(job, world, item, task.limit)
         taken, drawn = world.time, world.drawn
     task.trace.parent.mkdir(parents=True, exist_ok=True)
-    np.savez_compressed(task.trace, ways=np.array(ways), times=np.array(job.times))
+    np.savez_compressed(task.trace, ways=ways, times=np.array(job.times))
     done = job.index == len(task.targets)
     row: Row = {
         "scenario": task.scenario,
@@ -118,6 +106,34 @@ def run(task: SwarmTask) -> Row:
         row |= {"duration_s": taken, "lambda": taken * speed / length(task.targets)}
     row |= {f"{name.replace(' ', '_')}_s": spent for name, spent in phases.items()}
     return row | drawn
+
+
+def drive(
+    job: SwarmJob,
+    world: GroupWorld,
+    item: ObjectSpec,
+    limit: float,
+    meanwhile: Callable[[float], None] | None = None,
+) -> tuple[Array, dict[str, float]]:
+    """Until a job that was begun ends, or a time [s]: poses ``(t, 1 + n, 3)`` of object and robots
+    now and then, and how long [s] each phase took. meanwhile: told the time at every tick."""
+    ways, none = [], np.zeros((0, 3))
+    phases: dict[str, float] = {}
+    tick = 0
+    while world.time < limit and job.busy:
+        if meanwhile is not None:
+            meanwhile(world.time)
+        seen, robots = world.see()
+        here = dict(zip(world.names, robots, strict=True))
+        twists = job.step(world.time, item.mass_pose(seen), here, none)
+        if job.last is not None:
+            name = job.last.phase.value
+            phases[name] = phases.get(name, 0.0) + TICK
+        if tick % _TRACE == 0:
+            ways.append(np.vstack([*world.truth()]))
+        world.step(np.array([twists[n] for n in world.names]))
+        tick += 1
+    return np.array(ways), phases
 
 
 def draw_ways(axes: Axes, task: SwarmTask) -> None:

@@ -22,8 +22,10 @@ from push_model.settings import bounded, settings
 from push_model.specs import ObjectSpec
 from swarm_push.coverage import Coverage
 from swarm_push.crescent import crescent
+from swarm_push.density import Density
 from swarm_push.law import Scene, SwarmPhase, SwarmStep
 from swarm_push.rim import Nearest, Rim
+from swarm_push.walls import Walls
 from swarm_push.way_round import WayRound
 
 _REACH = 0.1  # [m] of gaps to the object that are looked at
@@ -62,10 +64,12 @@ class CrescentLaw:
         radius: float,
         speed: float,
         settings: CrescentLawSettings | None = None,
+        walls: Walls | None = None,
     ) -> None:
-        """region: ``(m, 2)`` [m] corners of the convex one in which centres of robots may be."""
+        """region: ``(m, 2)`` [m] corners of the convex one in which centres of robots may be;
+        walls: what stands in it."""
         self.settings = s = settings or CrescentLawSettings()
-        self._coverage, self._item = Coverage(region), item
+        self._coverage, self._item, self._walls = Coverage(region), item, walls
         self._radius, self._speed = radius, speed
         outline = item.geometry.outline
         self._rim = Rim(outline, radius, 1.5 * radius)
@@ -90,10 +94,11 @@ class CrescentLaw:
         lacking, held, ahead = self._lacking(near, twist)
         self._look_for_hold(scene.time, lacking, bool(ahead.any()))
         off = -s.press if self._pushing else s.wait
-        density = crescent(self._rim, pose, twist, off, s.least)
-        centroids = self._coverage.centroids(scene.robots, density)
+        drive = self._rim.drive(twist, self._item.contact_friction)
+        density = crescent(self._rim, pose, drive, off, s.least, self._free_places(pose))
+        centroids = self._centroids(scene, density)
         goals = self._at_rim(se2.transform(se2.inverse(pose), centroids), off)
-        aims, length = self._way_round(scene).aims(local, goals)
+        aims, length = self._ways(scene, local, goals)
         arrived = length < 3.0 * self._radius
         self._settled = min(self._settled, scene.time) if arrived.all() else math.inf
         phase = self._phase(arrived, held, local)
@@ -104,6 +109,34 @@ class CrescentLaw:
         inward, most = self._bounds(near, twist, held)
         world = se2.rotation_matrix(float(pose[2])).T
         return SwarmStep(moved @ world, density, centroids, phase, inward @ world, most)
+
+    def _centroids(self, scene: Scene, density: Density) -> Array:
+        """Robots that do not see the object for walls cover nothing: they make for it."""
+        if self._walls is None:
+            return self._coverage.centroids(scene.robots, density)
+        item = np.repeat(scene.pose[None, :2], len(scene.robots), axis=0)
+        seen = self._walls.sees(scene.robots, item)
+        item[seen] = self._coverage.centroids(scene.robots[seen], density)
+        return item
+
+    def _free_places(self, pose: Array) -> Mask | None:
+        """Which places at the object are clear of walls."""
+        if self._walls is None:
+            return None
+        return self._walls.free(se2.transform(pose, self._rim.points))
+
+    def _ways(self, scene: Scene, local: Array, goals: Array) -> tuple[Array, Array]:
+        """Where robots head for on their ways to goals, all ``(n, 2)`` [m] in the object's frame,
+        and how far ``(n,)`` [m] they have to go: round the object, and round walls."""
+        way, walls = self._way_round(scene), self._walls
+        if walls is None:
+            return way.aims(local, goals)
+        pose, back = scene.pose, se2.inverse(scene.pose)
+        goals = se2.transform(back, walls.into_room(se2.transform(pose, goals)))
+        aims, length = way.aims(local, goals)
+        aims = walls.into_room(se2.transform(pose, aims))
+        aims, length = walls.round_corners(scene.robots, aims, length, pose[:2])
+        return se2.transform(back, aims), length
 
     def _at_rim(self, goals: Array, off: float) -> Array:
         """Centroids ``(n, 2)`` of few robots' parts of the crescent lie behind its line, in the
@@ -159,7 +192,7 @@ class CrescentLaw:
         ``(n,)`` is there and where the object is pushed from, and who where it goes to."""
         s, rim = self.settings, self._fine
         k, depth = nearest
-        approach, near = rim.approach(twist), depth > -s.contact
+        approach, near = rim.drive(twist, self._item.contact_friction), depth > -s.contact
         some = 0.5 * s.least * max(float(approach.max()), 1e-12)
         held: Mask = near & (approach[k] > some)
         ahead: Mask = near & (approach[k] < -some)

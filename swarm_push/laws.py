@@ -9,6 +9,7 @@ from push_model.specs import ObjectSpec
 from swarm_push.crescent_law import CrescentLaw, CrescentLawSettings
 from swarm_push.law import SwarmLaw
 from swarm_push.thesis_law import ThesisLaw, ThesisLawSettings
+from swarm_push.walls import Walls
 
 
 @settings
@@ -28,11 +29,17 @@ class LawSections:
 
 
 def make_law(
-    sections: LawSections, region: Array, item: ObjectSpec, radius: float, speed: float
+    sections: LawSections,
+    region: Array,
+    item: ObjectSpec,
+    radius: float,
+    speed: float,
+    walls: Walls | None = None,
 ) -> SwarmLaw:
     """For round robots of a radius [m] and a greatest speed [m/s] that push an object in a convex
-    region ``(m, 2)`` [m] of their centres."""
+    region ``(m, 2)`` [m] of their centres; walls: what stands in it, of which the printed law knows
+    nothing."""
     if sections.law.law == "thesis":
         around = float((item.geometry.outline**2).sum(axis=1).max() ** 0.5)
         return ThesisLaw(region, around, sections.thesis)
-    return CrescentLaw(region, item, radius, speed, sections.crescent)
+    return CrescentLaw(region, item, radius, speed, sections.crescent, walls)

@@ -34,7 +34,8 @@ from push_ros.validation import InvalidMessage
 from push_scenario.scenario import Scenario, load_scenario
 from swarm_push.crescent_law import CrescentLawSettings
 from swarm_push.laws import LawSections, LawSettings
-from swarm_push.region import open_region
+from swarm_push.object_track import TrackSettings
+from swarm_push.region import covered_region
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
 from swarm_push.swarm_messages import status_to_ros, targets_from_ros
 from swarm_push.thesis_law import ThesisLawSettings
@@ -65,7 +66,7 @@ class SwarmNode(Node):
         _, self._robot = scenario.robot(self.robots[0])
         self.object, self._item = scenario.object(item)
         values = dict(scenario.parameters.get("swarm", {}))
-        sections = {k: values.pop(k, {}) for k in ("law", "crescent", "thesis", "poses")}
+        sections = {k: values.pop(k, {}) for k in ("law", "crescent", "thesis", "track", "poses")}
         self._settings = declare_settings(self, SwarmJobSettings, values, where="swarm")
         self._laws = LawSections(
             declare_settings(self, LawSettings, sections["law"], "law", "swarm.law"),
@@ -74,11 +75,15 @@ class SwarmNode(Node):
             ),
             declare_settings(self, ThesisLawSettings, sections["thesis"], "thesis", "swarm.thesis"),
         )
+        self._track = declare_settings(
+            self, TrackSettings, sections["track"], "track", "swarm.track"
+        )
         gate = declare_settings(self, PoseGateSettings, sections["poses"], "poses", "swarm.poses")
         self._others = {
             k: r for k, r in scenario.radii.items() if k not in (*self.robots, self.object)
         }
         self.job: SwarmJob | None = None
+        self._why_not = "there is no map yet"
         self._grid: Grid | None = None
         self._space: FreeSpace | None = None
         self._waiting = time.monotonic()
@@ -143,13 +148,15 @@ class SwarmNode(Node):
         if self._grid is None or self._space is None:
             return
         if self.job is None:
-            raise GoalRefused(
-                JobError.PLANNING_FAILED, "the map has obstacles: a swarm needs an open room"
-            )
+            raise GoalRefused(JobError.PLANNING_FAILED, self._why_not)
         if not self._grid.contains(float(goal[0]), float(goal[1])):
             raise GoalRefused(JobError.OUTSIDE_MAP, "the goal is outside the map")
         reach = float(np.hypot(*self._item.outline.T).max())
-        if self._space.clearance(goal[None, :2])[0] < reach:
+        roomy = self._space.clearance(goal[None, :2])[0] >= reach
+        track, pose = self.job.track, self._item.mass_pose(goal)
+        if not self._settings.orientation:
+            pose = np.array([*goal[:2], math.nan])
+        if not (roomy if track is None else track.fits(pose)):
             raise GoalRefused(JobError.GOAL_OCCUPIED, "the object does not fit there")
 
     def take_goal(self, goal: Array, plan_only: bool) -> None:
@@ -207,12 +214,25 @@ class SwarmNode(Node):
             return
         self.end_job(JobError.PREEMPTED, "the map has changed")
         self._grid, self._space = grid, FreeSpace(grid)
-        region = open_region(grid, self._robot.footprint_radius)
-        self.job = None
-        if region is not None:
-            self.job = SwarmJob(region, self._item, self._robot, self._settings, self._laws)
-            self.job.warm_up()
+        self.job = self._job(grid)
         self._look_after_job()
+
+    def _job(self, grid: Grid) -> SwarmJob | None:
+        """For a map; None where there can be none, for the reason in ``_why_not``."""
+        found = covered_region(grid, self._robot.footprint_radius)
+        if found is None:
+            self._why_not = "the map has no room for a robot"
+            return None
+        region, empty = found
+        if not empty and self._laws.law.law == "thesis":
+            self._why_not = "the map has obstacles, of which the printed law knows nothing"
+            return None
+        walls = None if empty else grid
+        job = SwarmJob(
+            region, self._item, self._robot, self._settings, self._laws, walls, self._track
+        )
+        job.warm_up()
+        return job
 
     def _on_frame(self, frame: Frame) -> None:
         self._stamp = frame.stamp

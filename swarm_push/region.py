@@ -6,20 +6,18 @@ from push_model.arrays import Array
 from push_model.occupancy import OccupancyGrid
 
 
-def open_region(grid: OccupancyGrid, margin: float) -> Array | None:
-    """``(4, 2)`` [m] corners of a room without obstacles, counter-clockwise, so far [m] from its
-    walls; None where the free cells of a map do not fill a rectangle."""
+def covered_region(grid: OccupancyGrid, margin: float) -> tuple[Array, bool] | None:
+    """``(4, 2)`` [m] corners, counter-clockwise, of the rectangle about the free cells of a map,
+    so far [m] from its sides, and whether nothing stands in it; None where there is no room."""
     free = ~grid.occupied
     rows, columns = np.flatnonzero(free.any(axis=1)), np.flatnonzero(free.any(axis=0))
     if not len(rows):
         return None
     part = free[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    if not part.all():
-        return None
     x, y = grid.origin
     left, right = x + columns[0] * grid.resolution, x + (columns[-1] + 1) * grid.resolution
     low, high = y + rows[0] * grid.resolution, y + (rows[-1] + 1) * grid.resolution
     if min(right - left, high - low) <= 2.0 * margin:
         return None
     left, low, right, high = left + margin, low + margin, right - margin, high - margin
-    return np.array([[left, low], [right, low], [right, high], [left, high]])
+    return np.array([[left, low], [right, low], [right, high], [left, high]]), bool(part.all())

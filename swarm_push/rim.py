@@ -1,12 +1,16 @@
-"""The line on which the centres of round robots lie that touch an object's convex hull."""
+"""The line on which the centres of round robots lie that touch an object."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from push_model.arrays import Array
-from push_model.outlines import convex_hull
+from push_model.outlines import convex_hull, distance, inside
+from push_model.screws import point_velocities
 
 _DIRECTIONS = 720
+_TURN = np.array([[0.0, 1.0], [-1.0, 0.0]])  # a quarter, of row vectors
+_STEP = 2e-3  # [m] between points of the line at notches
+_FLAT = 1e-9  # of an area: what an outline lacks of its hull's without having a notch
 
 Nearest = tuple[NDArray[np.int64], Array]
 """Which of a rim's points ``(n,)`` is the nearest to each of some others, and how far ``(n,)`` [m]
@@ -22,10 +26,10 @@ class Rim:
     def __init__(self, outline: Array, radius: float, spacing: float) -> None:
         """outline: ``(k, 2)`` [m] of the object about its centre of mass. radius: [m] of the
         robots. spacing: [m] between points, at most."""
-        angle = np.arange(_DIRECTIONS) / _DIRECTIONS * 2.0 * np.pi
-        out = np.column_stack([np.cos(angle), np.sin(angle)])
         hull = convex_hull(outline)
-        line = hull[np.argmax(out @ hull.T, axis=1)] + radius * out
+        line = _support_line(hull, radius)
+        if _area(outline) < (1.0 - _FLAT) * _area(hull):
+            line = _line_with_notches(outline, radius)
         ring = np.vstack([line, line[:1]])
         way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(ring, axis=0).T))])
         self.length = float(way[-1])
@@ -34,7 +38,7 @@ class Rim:
         self.points = np.column_stack([np.interp(at, way, column) for column in ring.T])
         # A step of the line is along an edge of the hull or round a corner: its middle direction
         # is the normal there.
-        k = np.clip(np.searchsorted(way, at, side="right") - 1, 0, _DIRECTIONS - 1)
+        k = np.clip(np.searchsorted(way, at, side="right") - 1, 0, len(line) - 1)
         step = np.diff(ring, axis=0)[k]
         normal = np.column_stack([-step[:, 1], step[:, 0]])
         self.normals = normal / np.hypot(*normal.T)[:, None]
@@ -48,7 +52,54 @@ class Rim:
     def approach(self, twist: Array) -> Array:
         """``(m,)`` [m/s] at which the points flee inward when the object moves with a twist
         ``(3,)`` in its frame: where that is much, robots push it so."""
-        vx = twist[0] - twist[2] * self.points[:, 1]
-        vy = twist[1] + twist[2] * self.points[:, 0]
-        speed: Array = vx * self.normals[:, 0] + vy * self.normals[:, 1]
+        moved = point_velocities(twist, self.points)
+        speed: Array = (moved * self.normals).sum(axis=1)
         return speed
+
+    def drive(self, twist: Array, friction: float) -> Array:
+        """``(m,)`` [m/s] how well robots at the points drive a twist: by the approach; where that
+        is less everywhere than what friction drives along the line, as for a disc that turns, by
+        both."""
+        approach = self.approach(twist)
+        slip = friction * np.abs(
+            (point_velocities(twist, self.points) @ _TURN * self.normals).sum(1)
+        )
+        if approach.max() >= slip.max():
+            return approach
+        both: Array = np.maximum(approach, 0.0) + slip
+        return both
+
+
+def _support_line(hull: Array, radius: float) -> Array:
+    """About a convex outline: by its outermost corner in every direction."""
+    angle = np.arange(_DIRECTIONS) / _DIRECTIONS * 2.0 * np.pi
+    out = np.column_stack([np.cos(angle), np.sin(angle)])
+    line: Array = hull[np.argmax(out @ hull.T, axis=1)] + radius * out
+    return line
+
+
+def _line_with_notches(outline: Array, radius: float) -> Array:
+    """About any outline: its edges moved out and arcs round its corners, without what is closer
+    to another part of it. A notch with a mouth too narrow for a robot must be too narrow inside."""
+    parts = []
+    edge = np.roll(outline, -1, axis=0) - outline
+    length = np.hypot(*edge.T)
+    normal = np.column_stack([edge[:, 1], -edge[:, 0]]) / length[:, None]  # outward
+    angle = np.arctan2(normal[:, 1], normal[:, 0])
+    for k in range(len(outline)):
+        turn = float(np.remainder(angle[k] - angle[k - 1] + np.pi, 2.0 * np.pi) - np.pi)
+        steps = np.linspace(0.0, 1.0, max(2, int(np.ceil(max(turn, 0.0) * radius / _STEP))))
+        a = angle[k - 1] + turn * steps
+        if turn > 0.0:
+            parts.append(outline[k] + radius * np.column_stack([np.cos(a), np.sin(a)]))
+        along = np.linspace(0.0, 1.0, max(2, int(np.ceil(length[k] / _STEP))))[:, None]
+        parts.append(outline[k] + radius * normal[k] + along * edge[k])
+    line = np.vstack(parts)
+    line = line[(distance(outline, line) > radius - 1e-6) & ~inside(outline, line)]
+    kept: Array = line[np.hypot(*(line - np.roll(line, 1, axis=0)).T) > 1e-9]
+    return kept
+
+
+def _area(outline: Array) -> float:
+    x, y = outline.T
+    return 0.5 * float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))

@@ -29,13 +29,13 @@ def keep_apart(
     stand.
 
     radii: ``(m,)`` [m]. gap: [m] between bodies that is kept. rate: [1/s] of the gap beyond it that
-    may close. reach: [m] of gaps up to which pairs are looked at. bounds: ``(n, 3)`` a unit vector
-    for each robot and how fast [m/s] it may go along it.
+    may close. reach: [m] of gaps up to which pairs are looked at. bounds: ``(b, n, 3)`` unit
+    vectors for each robot and how fast [m/s] it may go along them.
     """
     moved = np.zeros((len(points), 2))
     moved[: len(velocities)] = velocities
     if bounds is None:
-        bounds = np.column_stack([0.0 * velocities, np.full(len(velocities), np.inf)])
+        bounds = np.zeros((0, len(velocities), 3))
     if len(velocities):
         order = np.argsort(points[:, 0], kind="stable")
         points, radii = np.ascontiguousarray(points), np.ascontiguousarray(radii)
@@ -78,11 +78,13 @@ def _part(
                 if j < count:
                     moved[j, 0] += part * excess * ux
                     moved[j, 1] += part * excess * uy
-        for i in range(count):
-            excess = moved[i, 0] * bounds[i, 0] + moved[i, 1] * bounds[i, 1] - bounds[i, 2]
-            if excess > 0.0:
-                most = max(most, excess)
-                moved[i, 0] -= excess * bounds[i, 0]
-                moved[i, 1] -= excess * bounds[i, 1]
+        for k in range(bounds.shape[0]):
+            for i in range(count):
+                ux, uy = bounds[k, i, 0], bounds[k, i, 1]
+                excess = moved[i, 0] * ux + moved[i, 1] * uy - bounds[k, i, 2]
+                if excess > 0.0:
+                    most = max(most, excess)
+                    moved[i, 0] -= excess * ux
+                    moved[i, 1] -= excess * uy
         if most < 1e-4:
             break

@@ -5,6 +5,7 @@ Robots may come, leave and die meanwhile: whoever is seen and does as it is told
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -13,12 +14,16 @@ from push_estimation.obedience import Obedience
 from push_model import se2
 from push_model.arrays import Array, Mask
 from push_model.jobs import JobError, JobPhase
+from push_model.object_way import NoObjectWay
+from push_model.occupancy import OccupancyGrid
 from push_model.outlines import distance
 from push_model.settings import bounded, settings
 from push_model.specs import ObjectSpec, RobotSpec
 from swarm_push.law import Scene, SwarmPhase, SwarmStep
 from swarm_push.laws import LawSections, make_law
+from swarm_push.object_track import ObjectTrack, TrackSettings
 from swarm_push.spacing import keep_apart
+from swarm_push.walls import Walls
 
 _STATES = {
     SwarmPhase.GATHER: (JobPhase.POSITIONING, "robots gather at the object"),
@@ -27,6 +32,7 @@ _STATES = {
     SwarmPhase.PUSH: (JobPhase.PUSHING, "robots push"),
 }
 _CLOSER = 5e-3  # [m] that counts as progress
+_PLAN_AGAIN = 2.0  # [s] at least between ways of the object
 _AT = 0.01  # [m] of a gap to a robot within which something may hold it up
 
 
@@ -63,14 +69,21 @@ class SwarmJob:
         robot: RobotSpec,
         settings: SwarmJobSettings | None = None,
         laws: LawSections | None = None,
+        grid: OccupancyGrid | None = None,
+        track: TrackSettings | None = None,
     ) -> None:
         """region: ``(m, 2)`` [m] corners, counter-clockwise, of the convex one in which centres of
-        robots may be."""
+        robots may be. grid: the map, where something stands in it; track: how the object then goes
+        round that."""
         self.settings, self.region = settings or SwarmJobSettings(), region
         self._drive, self._radius = robot.differential, robot.footprint_radius
-        self._law = make_law(
-            laws or LawSections(), region, item, self._radius, self._drive.max_speed
-        )
+        self._walls = None if grid is None else Walls(grid, self._radius)
+        self.track = None
+        if grid is not None:
+            track = track or TrackSettings()
+            self.track = ObjectTrack(grid, item.geometry.outline, self._radius, track)
+        speed = self._drive.max_speed
+        self._law = make_law(laws or LawSections(), region, item, self._radius, speed, self._walls)
         self._outline = item.geometry.outline
         self._lever = float(np.hypot(*self._outline.T).max())
         self.state, self.reason, self.error = JobPhase.IDLE, "waiting for a goal", JobError.NONE
@@ -84,16 +97,19 @@ class SwarmJob:
         self._begun: float | None = None
         self._nearest = math.inf
         self._progress = self._seen = 0.0
+        self._planned = -math.inf
 
     def warm_up(self) -> None:
         """Load what is compiled, so that the first command does not wait."""
         middle = self.region.mean(axis=0)
+        if self._walls is not None:
+            middle = self._walls.into_room(middle[None])[0]
         robots = {str(i): np.array([*(middle + [0.3 * i - 0.6, 0.0]), 0.0]) for i in range(3)}
         self.begin([np.array([*(middle + 0.1), 0.0])])
         self.step(0.0, np.array([*middle, 0.0]), robots, np.array([[*middle, 0.01]]))
         self.end(JobError.NONE, "waiting for a goal")
         self.targets, self.taking_part = (), ()
-        self._law.reset()
+        self._new_way()
 
     @property
     def busy(self) -> bool:
@@ -116,7 +132,7 @@ class SwarmJob:
         self.error, self.index, self.times = JobError.NONE, 0, []
         self._begun = None
         self.revive()
-        self._law.reset()
+        self._new_way()
         self.state, self.reason = JobPhase.POSITIONING, "robots gather at the object"
 
     def retarget(self, target: Array) -> None:
@@ -124,6 +140,14 @@ class SwarmJob:
         moved = np.array(target, dtype=np.float64)
         self.targets = (*self.targets[: self.index], moved, *self.targets[self.index + 1 :])
         self._nearest = math.inf
+        if self.track is not None:
+            self.track.clear()
+
+    def _new_way(self) -> None:
+        self._law.reset()
+        self._planned = -math.inf
+        if self.track is not None:
+            self.track.clear()
 
     def end(self, code: JobError, message: str) -> None:
         """End the job under way."""
@@ -160,8 +184,9 @@ class SwarmJob:
         if not names:
             return dict.fromkeys(robots, (0.0, 0.0))
         self.taking_part, poses = names, np.array([robots[n] for n in names])
-        target = self.target
-        assert target is not None
+        target = self._aim(now, pose, others)
+        if target is None:
+            return dict.fromkeys(robots, (0.0, 0.0))
         still = [[*robots[n][:2], self._radius] for n in robots if n in self._dead]
         fixed = np.vstack([np.array(still).reshape(-1, 3), others])
         self.last = step = self._law.step(Scene(now, pose, poses[:, :2], target, fixed))
@@ -173,12 +198,36 @@ class SwarmJob:
         told = {n: (float(v), float(w)) for n, (v, w) in zip(names, twists, strict=True)}
         return {n: told.get(n, (0.0, 0.0)) for n in robots}
 
+    def _aim(self, now: float, pose: Array, others: Array) -> Array | None:
+        """Where the object is to head for: its target, or round walls; None ends the job."""
+        target, track = self.target, self.track
+        assert target is not None
+        if track is None:
+            return target
+        if not track.under_way:
+            try:
+                track.plan(pose, target, others)
+            except NoObjectWay as error:
+                self.end(JobError.PLANNING_FAILED, str(error))
+                return None
+        aim, off = track.aim(pose)
+        if off > track.settings.off and now - self._planned > _PLAN_AGAIN:
+            self._planned = now
+            with suppress(NoObjectWay):  # back to the way that there is
+                track.plan(pose, target, others)
+                aim, _ = track.aim(pose)
+                self._nearest = max(self._nearest, track.left(pose))
+        return aim
+
     def _spaced(self, step: SwarmStep, points: Array, fixed: Array) -> Array:
         s, speed = self.settings, self._drive.max_speed
         bodies = np.vstack([points, fixed[:, :2]])
         radii = np.concatenate([np.full(len(points), self._radius), fixed[:, 2]])
         slowed = _limited(step.velocities, speed)
-        bounds = np.column_stack([step.inward, step.most])
+        bounds = np.column_stack([step.inward, step.most])[None]
+        if self._walls is not None:
+            walls = self._walls.bounds(points, s.closing, s.apart)
+            bounds = np.concatenate([bounds, walls[None]])
         reach = speed / s.closing
         apart = keep_apart(slowed, bodies, radii, s.apart, s.closing, reach, bounds)
         return _limited(apart, speed)
@@ -194,7 +243,7 @@ class SwarmJob:
             self.times.append(now - self._begun - sum(self.times))
             self.index += 1
             self._nearest, self._progress = math.inf, now
-            self._law.reset()
+            self._new_way()
             if self.index >= len(self.targets):
                 self.end(JobError.NONE, f"at the goal: {1e3 * away:.1f} mm, {turned:.3f} rad")
                 return True
@@ -210,6 +259,8 @@ class SwarmJob:
             return True
         away, turned = self.errors(pose)
         left = away + self._lever * turned
+        if self.track is not None and self.track.under_way:
+            left = self.track.left(pose)
         if left < self._nearest - _CLOSER:
             self._nearest, self._progress = left, now
         if now - self._progress > s.stalled:

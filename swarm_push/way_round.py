@@ -1,6 +1,7 @@
-"""Ways of robots round a convex object: towards a place on its other side, without touching it.
+"""Ways of robots round an object: towards a place on its other side, without touching it.
 
-All in the object's frame. Compiled, for there may be a thousand robots.
+They lead round its convex hull, and straight into its notches. All in the object's frame. Compiled,
+for there may be a thousand robots.
 """
 
 import math
@@ -10,9 +11,11 @@ import numba
 import numpy as np
 
 from push_model.arrays import Array
+from push_model.outlines import convex_hull
 from swarm_push.rim import Rim
 
 _NEAR = 3.0  # robots' radii within which a robot at the object slides along it
+_SPARE = 0.02  # [m] of a way into a notch
 
 
 class WayRound:
@@ -31,10 +34,10 @@ class WayRound:
         along it may head. others: ``(k, 3)`` x, y, radius [m] of what stands at the
         object, in its frame; robots go round both together."""
         self._radius = radius
-        whole = outline if others is None else np.vstack([outline, *map(_disc, others)])
+        whole = convex_hull(np.vstack([outline, *map(_disc, () if others is None else others)]))
         self._way = Rim(whole, radius + clearance, 0.05).points
         self._keep = Rim(whole, radius + 0.6 * clearance, 0.02).points
-        self._core = Rim(outline, radius - slide, 0.02).points
+        self._core = Rim(outline, radius - slide, 5e-3).points
 
     def aims(self, robots: Array, goals: Array) -> tuple[Array, Array]:
         """Where robots ``(n, 2)`` [m] head for on their ways to goals ``(n, 2)``, and how far
@@ -78,11 +81,44 @@ def _blocked(ax: float, ay: float, bx: float, by: float, polygon: Any) -> bool:
 
 
 @numba.njit(cache=True, error_model="numpy")
+def _enters(ax: float, ay: float, bx: float, by: float, polygon: Any) -> bool:
+    """Whether the way from a to b leads through any polygon, or begins in it."""
+    n = polygon.shape[0]
+    within = False
+    for k in range(n):
+        px, py = polygon[k, 0], polygon[k, 1]
+        u = k + 1 if k + 1 < n else 0
+        qx, qy = polygon[u, 0], polygon[u, 1]
+        if (py > ay) != (qy > ay) and ax < px + (ay - py) * (qx - px) / (qy - py):
+            within = not within
+        c = (bx - ax) * (py - ay) - (by - ay) * (px - ax)
+        d = (bx - ax) * (qy - ay) - (by - ay) * (qx - ax)
+        e = (qx - px) * (ay - py) - (qy - py) * (ax - px)
+        f = (qx - px) * (by - py) - (qy - py) * (bx - px)
+        if (c > 0.0) != (d > 0.0) and (e > 0.0) != (f > 0.0):
+            return True
+    return within
+
+
+@numba.njit(cache=True, error_model="numpy")
 def _closest(x: float, y: float, way: Any) -> int:
     best, found = math.inf, 0
     for k in range(way.shape[0]):
         d = (way[k, 0] - x) ** 2 + (way[k, 1] - y) ** 2
         if d < best:
+            best, found = d, k
+    return found
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _gate(x: float, y: float, way: Any, core: Any) -> Any:
+    """Of the way's points the closest one that leads straight to a place."""
+    best, found = math.inf, _closest(x, y, way)
+    if not _enters(way[found, 0], way[found, 1], x, y, core):
+        return found
+    for k in range(way.shape[0]):
+        d = (way[k, 0] - x) ** 2 + (way[k, 1] - y) ** 2
+        if d < best and not _enters(way[k, 0], way[k, 1], x, y, core):
             best, found = d, k
     return found
 
@@ -96,11 +132,14 @@ def _aims(robots: Any, goals: Any, way: Any, keep: Any, core: Any, near: float) 
         x, y, gx, gy = robots[i, 0], robots[i, 1], goals[i, 0], goals[i, 1]
         straight = math.hypot(gx - x, gy - y)
         aims[i, 0], aims[i, 1], length[i] = gx, gy, straight
-        if straight < near and not _blocked(x, y, gx, gy, core):
-            continue
-        last = _closest(gx, gy, way)
+        last = _gate(gx, gy, way, core)
         # The goal may lie at the object: the way leads to what is outside of it, then straight in.
         tail = math.hypot(gx - way[last, 0], gy - way[last, 1])
+        close = near
+        if tail + _SPARE > near and _blocked(gx, gy, gx, gy, keep):
+            close = tail + _SPARE
+        if straight < close and not _enters(x, y, gx, gy, core):
+            continue
         if not _blocked(x, y, gx, gy, keep):
             continue
         if not _blocked(x, y, way[last, 0], way[last, 1], keep):

@@ -12,12 +12,12 @@ import numpy as np
 
 from grasp_opt.group_job import GroupJob
 from grasp_opt.marshal import NoStep
-from grasp_opt.object_way import NoObjectWay, WayFinder
 from grasp_opt.step_planner import StepPlanner, StepSettings, TooFew
 from push_model import se2
 from push_model.arrays import Array
 from push_model.free_space import FreeSpace, Obstacles
 from push_model.jobs import JobError, JobPhase
+from push_model.object_way import NoObjectWay, WayFinder
 from push_model.occupancy import OccupancyGrid, rasterise
 from push_model.settings import SettingsError, from_mapping
 from push_model.specs import EnvironmentSpec, ObjectSpec

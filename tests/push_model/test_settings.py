@@ -22,6 +22,7 @@ from push_supervisor.settings import SupervisorSettings
 from sim_bridge.planar_world import PlanarSettings
 from sim_bridge.settings import BridgeSettings, MotionCaptureSettings, PhysicsSettings
 from swarm_push.crescent_law import CrescentLawSettings
+from swarm_push.object_track import TrackSettings
 from swarm_push.swarm_job import SwarmJobSettings
 from swarm_push.thesis_law import ThesisLawSettings
 
@@ -44,6 +45,7 @@ ALL = (
     SwarmJobSettings,
     CrescentLawSettings,
     ThesisLawSettings,
+    TrackSettings,
 )
 
 

@@ -18,7 +18,7 @@ from push_study.swarm_run import starts
 from push_study.uncertainty import uncertainty
 from swarm_push.crescent_law import CrescentLawSettings
 from swarm_push.laws import LawSections, LawSettings
-from swarm_push.region import open_region
+from swarm_push.region import covered_region
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
 from swarm_push.swarm_messages import targets_from_ros
 
@@ -179,18 +179,19 @@ def test_robots_that_come_and_leave_take_part_as_long_as_they_are_there():
         assert np.isfinite(list(twists.values())).all()
 
 
-def test_rooms_without_obstacles_are_regions_and_others_are_none():
+def test_the_region_is_the_rectangle_about_free_cells():
     occupied = np.zeros((40, 60), dtype=np.bool_)
     occupied[:2], occupied[-2:], occupied[:, :2], occupied[:, -2:] = True, True, True, True
     grid = OccupancyGrid(occupied, 0.05, np.array([-1.5, -1.0]))
-    corners = open_region(grid, 0.05)
+    corners, empty = covered_region(grid, 0.05)
+    assert empty
     assert np.allclose(corners, [[-1.35, -0.85], [1.35, -0.85], [1.35, 0.85], [-1.35, 0.85]])
-    assert open_region(grid, 1.0) is None
+    assert covered_region(grid, 1.0) is None
     occupied[20, 30] = True
-    assert open_region(grid, 0.05) is None
-    assert (
-        open_region(OccupancyGrid(np.ones((4, 4), dtype=np.bool_), 0.05, np.zeros(2)), 0.0) is None
-    )
+    again, empty = covered_region(grid, 0.05)
+    assert not empty and np.array_equal(again, corners)
+    full = OccupancyGrid(np.ones((4, 4), dtype=np.bool_), 0.05, np.zeros(2))
+    assert covered_region(full, 0.0) is None
 
 
 def test_targets_of_the_action():

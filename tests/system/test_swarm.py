@@ -28,6 +28,8 @@ VALUES = {
     "parameters": {"bridge": {"world": "planar"}},
 }
 
+LAW = {"law": {"law": "thesis"}}
+
 
 def running(**changes):
     scenario = scenario_from_mapping({**VALUES, **changes}, "test", "test")
@@ -114,14 +116,43 @@ def test_goals_that_cannot_be_are_refused_with_a_code(run, goal, code):
     assert run.observer.state.refusal_code == code and run.observer.state.job == before
 
 
-def test_a_room_with_obstacles_is_refused():
-    environment = {"size": [4.0, 3.0], "circles": [{"centre": [1.3, -1.0], "radius": 0.1}]}
-    with running(environment=environment) as run:
+BEYOND = [1.4, 0.0, 0.0]
+WALL = {"size": [4.0, 3.0], "boxes": [{"centre": [0.6, -0.5], "size": [0.2, 2.0]}]}
+
+
+def test_an_object_is_brought_round_a_wall():
+    with running(environment=WALL, goal=[1.3, -0.8, 0.5]) as run:
         run.start()
-        run.teams[""].send_goal(np.array(VALUES["goal"]))
+        state = run.reach(np.array([1.3, -0.8, 0.5]), 300.0)
+        assert state is not None and state.error_code == 0, state.reason
+        ways = run.observer.trace.object
+        off = ways[-1] - [1.3, -0.8, 0.5]
+        assert np.hypot(*off[:2]) < 0.03 and abs(math.remainder(off[2], 2.0 * math.pi)) < 0.06
+        assert np.array(ways)[:, 1].max() > 0.6  # there is no other way
+
+
+def test_goals_in_walls_or_without_a_way_are_refused_or_given_up():
+    with running(environment=WALL, goal=BEYOND) as run:
+        run.start()
+        run.teams[""].send_goal(np.array([0.6, -0.5, 0.0]))
+        assert run.spin_until(lambda: run.teams[""].refused, 5.0)
+        assert run.observer.state.refusal_code == JobError.GOAL_OCCUPIED
+    shut = {"size": [4.0, 3.0], "boxes": [{"centre": [0.8, 0.0], "size": [0.2, 2.6]}]}
+    with running(environment=shut, goal=BEYOND) as run:
+        run.start()
+        state = run.reach(np.array([1.4, 0.0, 0.0]))
+        assert state is not None and state.error_code == JobError.PLANNING_FAILED
+        assert "no way" in state.reason
+
+
+def test_the_printed_law_refuses_walls():
+    parameters = {**VALUES["parameters"], "swarm": LAW}
+    with running(environment=WALL, goal=BEYOND, parameters=parameters) as run:
+        run.start()
+        run.teams[""].send_goal(np.array(BEYOND))
         assert run.spin_until(lambda: run.teams[""].refused, 5.0)
         assert run.observer.state.refusal_code == JobError.PLANNING_FAILED
-        assert "obstacles" in run.observer.state.refusal
+        assert "printed law" in run.observer.state.refusal
 
 
 def test_the_rest_finish_when_robots_die_and_leave():

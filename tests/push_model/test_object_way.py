@@ -5,10 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from grasp_opt.object_trajectory import sampled, screw
-from grasp_opt.object_way import NoObjectWay, WayFinder, pieces
 from push_model import se2
 from push_model.free_space import FreeSpace, Obstacles
+from push_model.object_way import NoObjectWay, WayFinder, pieces
 from push_model.occupancy import OccupancyGrid, rasterise
 from push_model.screws import screw_between, screw_poses
 from push_model.specs import EnvironmentSpec
@@ -27,27 +26,6 @@ def test_a_screw_leads_from_pose_to_pose_with_one_twist():
         assert se2.between(goal, ends[1]) == pytest.approx(np.zeros(3), abs=1e-9)
         half = screw_poses(start, motion, np.array([0.5]))[0]
         assert screw_between(start, half) == pytest.approx(0.5 * motion, abs=1e-9)
-
-
-def test_a_screw_in_time_has_the_twist_that_its_poses_have():
-    random = np.random.default_rng(2)
-    for _ in range(50):
-        start, motion = random.uniform(-1.0, 1.0, 3), random.uniform(-1.0, 1.0, 3)
-        task = screw(start, motion, 0.05, 0.05, 0.25)
-        rate = np.gradient(task.pose, task.time, axis=0)
-        assert task.twist[3:-3] == pytest.approx(rate[3:-3], abs=1e-3)
-        moving = np.linalg.norm(task.body_twists, axis=1) > 1e-3
-        unit = task.body_twists[moving] / np.linalg.norm(task.body_twists[moving], axis=1)[:, None]
-        assert np.ptp(unit, axis=0) == pytest.approx(np.zeros(3), abs=1e-6)
-        assert (np.hypot(*task.twist[:, :2].T) + 0.25 * np.abs(task.twist[:, 2])).max() < 0.0501
-        again = sampled(task.time, task.pose)
-        assert again.twist[3:-3] == pytest.approx(task.twist[3:-3], abs=2e-3)
-
-
-def test_times_that_do_not_ascend_from_zero_are_no_trajectory():
-    for time in ([0.0, 1.0], [0.1, 1.0, 2.0], [0.0, 1.0, 1.0]):
-        with pytest.raises(ValueError, match="ascend from 0"):
-            sampled(np.array(time), np.zeros((len(time), 3)))
 
 
 def test_ways_keep_their_room_and_lead_to_the_goal():

@@ -56,6 +56,7 @@ class WayFinder:
             ]
         )
         self._reach = float(np.hypot(*outline.T).max())
+        self._on_map: Array | None = None  # clearance of the lattice's poses on the bare map
 
     def clearance(self, poses: Array, among: Obstacles) -> Array:
         """``(n,)`` [m] of the outline at poses ``(n, 3)``."""
@@ -82,13 +83,15 @@ class WayFinder:
         return bool((room >= np.minimum(need, back)).all() and room.min() >= _LEAST)
 
     def way(self, start: Array, goal: Array, among: Obstacles) -> ObjectWay:
-        """From a pose ``(3,)`` to another, of the centre of mass.
+        """From a pose ``(3,)`` to another, of the centre of mass; where the goal's heading is nan
+        with any heading.
 
         Raises
         ------
         NoObjectWay
         """
-        direct = screw_between(start, goal)
+        straight = np.array([*goal[:2], start[2] if math.isnan(goal[2]) else goal[2]])
+        direct = screw_between(start, straight)
         if self.keeps(start, direct, among):
             return ObjectWay(start, direct[None])
         poses = self._lattice_way(start, goal, among)
@@ -101,9 +104,7 @@ class WayFinder:
         places = self._space.places[number.ravel()]
         headings = 2.0 * math.pi * np.arange(_HEADINGS) / _HEADINGS
         poses = np.array([[x, y, h] for h in headings for x, y in places])
-        free = np.concatenate(
-            [self.clearance(layer, among) >= self._room for layer in np.split(poses, _HEADINGS)]
-        )
+        free = self._lattice_clearance(poses, among) >= self._room
         first, second, cost = self._edges(number.shape)
         keep = free[first] & free[second]
         first, second, cost = first[keep], second[keep], cost[keep]
@@ -125,7 +126,18 @@ class WayFinder:
         while node != count:
             chain.append(poses[node])
             node = int(before[node])
-        return np.vstack([start, *chain[::-1], goal])
+        return np.vstack([start, *chain[::-1], _headed(goal, chain[0])])
+
+    def _lattice_clearance(self, poses: Array, among: Obstacles) -> Array:
+        bare = not among.outlines and not len(among.discs)
+        if bare and self._on_map is not None:
+            return self._on_map
+        found = np.concatenate(
+            [self.clearance(layer, among) for layer in np.split(poses, _HEADINGS)]
+        )
+        if bare:
+            self._on_map = found
+        return found
 
     def _edges(self, shape: tuple[int, int]) -> tuple[Array, Array, Array]:
         """Neighbours on the lattice of poses, and what a step between them costs [m]."""
@@ -150,11 +162,16 @@ class WayFinder:
         self, end: Array, poses: Array, free: Mask, among: Obstacles
     ) -> tuple[Array, Array]:
         """Numbers of poses of the lattice that an end has a piece to, and what that costs."""
-        turn = np.abs(np.remainder(poses[:, 2] - end[2] + math.pi, 2.0 * math.pi) - math.pi)
+        off = np.zeros(len(poses)) if math.isnan(end[2]) else poses[:, 2] - end[2]
+        turn = np.abs(np.remainder(off + math.pi, 2.0 * math.pi) - math.pi)
         away = np.hypot(poses[:, 0] - end[0], poses[:, 1] - end[1]) + _TURN * turn
         near = np.flatnonzero(free & (away < 0.6))
         near = near[np.argsort(away[near], kind="stable")][:_TO_LATTICE]
-        keeps = [self.keeps(end, screw_between(end, poses[k]), among) for k in near]
+        ends = [_headed(end, poses[k]) for k in near]
+        keeps = [
+            self.keeps(e, screw_between(e, poses[k]), among)
+            for e, k in zip(ends, near, strict=True)
+        ]
         near = near[np.array(keeps, dtype=bool)]
         return near, away[near]
 
@@ -171,6 +188,11 @@ class WayFinder:
             motions.append(screw_between(poses[k], poses[ahead]))
             k = ahead
         return np.array(motions)
+
+
+def _headed(end: Array, pose: Array) -> Array:
+    """An end whose heading does not matter has that of a pose."""
+    return np.array([*end[:2], pose[2]]) if math.isnan(end[2]) else end
 
 
 def pieces(way: ObjectWay) -> list[tuple[Array, Array]]:

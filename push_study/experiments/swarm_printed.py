@@ -1,0 +1,24 @@
+"""Section 4.3.1: four shapes, swarms of 8 to 20 e-pucks, six targets, by the printed law.
+
+Long runs: a quarter of an hour of simulation each.
+"""
+
+from push_study.pool import Row
+from push_study.study import StudyOptions
+from push_study.swarm_run import SwarmTask, run
+from push_study.swarm_shapes import SHAPES, conclude, tasks_by
+
+__all__ = ["CHOOSES_WORLD", "SCENARIOS", "conclude", "tasks", "trial"]
+
+SCENARIOS = SHAPES
+CHOOSES_WORLD = True
+
+
+def tasks(options: StudyOptions) -> list[SwarmTask]:
+    """Every object with every swarm."""
+    return tasks_by("thesis", options)
+
+
+def trial(task: SwarmTask) -> Row:
+    """Through all six targets."""
+    return run(task)
