@@ -21,6 +21,7 @@ from push_scenario.scenario import Scenario
 from push_supervisor import SupervisorSettings
 from sim_bridge.settings import BridgeSettings, MotionCaptureSettings, PhysicsSettings
 from sim_bridge.worlds import world_kind
+from swarm_push.agent import AgentSettings
 from swarm_push.crescent_law import CrescentLawSettings
 from swarm_push.laws import LawSettings
 from swarm_push.object_track import TrackSettings
@@ -55,6 +56,7 @@ SECTIONS: dict[str, dict[str, type[Any]]] = {
         "crescent": CrescentLawSettings,
         "thesis": ThesisLawSettings,
         "track": TrackSettings,
+        "agents": AgentSettings,
         "poses": PoseGateSettings,
     },
     "torque_controller": {

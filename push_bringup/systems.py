@@ -6,7 +6,7 @@ A further system is a function that returns such a list, and a row in ``SYSTEMS`
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from rclpy.node import Node
@@ -44,6 +44,7 @@ MODULES = {
     "group": "grasp_opt.node",
     "optimizer": "grasp_opt.optimizer_node",
     "swarm": "swarm_push.node",
+    "swarm_agent": "swarm_push.agent_node",
     "recorder": "push_record.recorder",
 }
 """Kind of a node to the module whose ``main`` runs it in a process of its own."""
@@ -73,13 +74,13 @@ class NodeSpec:
     def words(self, scenario: str) -> list[str]:
         """Command line of its process; scenario: name or path of the file that it reads."""
         values: dict[str, Any] = {"scenario": scenario, **self.parameters}
-        if self.kind in (*OWNERS, "planner", "optimizer", "recorder"):
+        if self.kind in (*OWNERS, "planner", "optimizer", "swarm_agent", "recorder"):
             values["world"] = self.world
-        if self.kind in ("controller", "supervisor", "torque_controller"):
+        if self.kind in ("controller", "supervisor", "torque_controller", "swarm_agent"):
             values["robot"] = self.robot
-        if self.kind in (*CROWDS, "optimizer"):
+        if self.kind in (*CROWDS, "optimizer", "swarm_agent"):
             values["robots"] = list(self.robots)
-        if self.kind in (*OWNERS, "optimizer"):
+        if self.kind in (*OWNERS, "optimizer", "swarm_agent"):
             values["object"] = self.item
         remaps = {"__ns": self.namespace, **self.remaps}
         words = ["--ros-args"]
@@ -144,6 +145,12 @@ def _swarm(spec: NodeSpec, scenario: Scenario) -> Node:
     return SwarmNode(scenario, spec.robots, spec.item, spec.namespace, spec.world)
 
 
+def _swarm_agent(spec: NodeSpec, scenario: Scenario) -> Node:
+    from swarm_push.agent_node import SwarmAgentNode
+
+    return SwarmAgentNode(scenario, spec.robot, spec.robots, spec.item, spec.namespace, spec.world)
+
+
 _MAKERS: dict[str, Callable[[NodeSpec, Scenario], Node]] = {
     "bridge": _bridge,
     "planner": _planner,
@@ -153,6 +160,7 @@ _MAKERS: dict[str, Callable[[NodeSpec, Scenario], Node]] = {
     "group": _group,
     "optimizer": _optimizer,
     "swarm": _swarm,
+    "swarm_agent": _swarm_agent,
 }
 
 
@@ -282,7 +290,8 @@ def group(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
 
 
 def swarm(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
-    """Any number of robots that move one object, for each team; all in one world.
+    """Any number of robots that move one object, for each team; all in one world. One node moves
+    them all, or each robot has its own where ``agents.decentralised`` of ``swarm`` says so.
 
     Raises
     ------
@@ -291,21 +300,25 @@ def swarm(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
     """
     world = _absolute(namespace)
     nodes = [NodeSpec("bridge", "bridge", world, world)]
+    alone = scenario.parameters.get("swarm", {}).get("agents", {}).get("decentralised", False)
     for team in teams_of(scenario):
         _check_crowd(scenario, team, "swarm")
-        place = team_space(namespace, team.name)
-        name = f"{team.name}/swarm" if team.name else "swarm"
-        nodes.append(
-            NodeSpec(
-                name,
-                "swarm",
-                place,
-                world,
-                robots=team.robots,
-                item=team.object,
-                team=team.name,
-            )
+        prefix = f"{team.name}/" if team.name else ""
+        desk = NodeSpec(
+            f"{prefix}swarm",
+            "swarm",
+            team_space(namespace, team.name),
+            world,
+            robots=team.robots,
+            item=team.object,
+            team=team.name,
         )
+        nodes.append(desk)
+        nodes += [
+            replace(desk, name=f"{prefix}{robot}/agent", kind="swarm_agent", robot=robot,
+                    remaps={"__node": f"agent_{robot}"})
+            for robot in (team.robots if alone else ())
+        ]  # fmt: skip
     return tuple(nodes)
 
 

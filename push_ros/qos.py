@@ -11,6 +11,9 @@ COMMAND = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 STATUS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 """Status, diagnostics, markers."""
 
+CHATTER = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""What all robots of a swarm say to each other."""
+
 LATCHED = QoSProfile(
     depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )

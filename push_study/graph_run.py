@@ -131,7 +131,7 @@ class LockstepRun:
         kinds = [s.kind for s in specs]
         owned = [len(s.robots) for s in specs if s.kind in CROWDS]
         self._commanded = kinds.count("supervisor") + sum(owned)
-        self._listeners = 2 * kinds.count("supervisor") + len(owned)
+        self._listeners = 2 * kinds.count("supervisor") + len(owned) + kinds.count("swarm_agent")
         self.spinner = Spinner(nodes)
 
     def __enter__(self) -> "LockstepRun":

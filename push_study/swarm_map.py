@@ -16,8 +16,9 @@ from push_scenario.bodies import load_object, load_robot
 from push_scenario.files import find, read_yaml
 from push_study.group_world import GroupWorld
 from push_study.pool import Row
-from push_study.swarm_run import ROBOT, drive
+from push_study.swarm_run import ROBOT, TRACE, drive
 from push_study.uncertainty import uncertainty
+from swarm_push.agent import Agent, AgentSettings, Word
 from swarm_push.region import covered_region
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
 
@@ -35,7 +36,8 @@ _STALLED = 120.0  # [s]
 
 @dataclass(frozen=True)
 class MapTask:
-    """A run. scenario: name of the map; item: of the object; turned: whether headings matter."""
+    """A run. scenario: name of the map; item: of the object; turned: whether headings matter; lost:
+    part of the messages between robots that decide for themselves, None where one node decides."""
 
     scenario: str
     seed: int
@@ -46,6 +48,7 @@ class MapTask:
     world: str
     uncertainty: str
     limit: float
+    lost: float | None = None
 
     @property
     def trace(self) -> Path:
@@ -85,14 +88,19 @@ def run(task: MapTask) -> Row:
     (sx, sy), (gx, gy) = MAPS[task.scenario]
     start = np.array([sx, sy, random.uniform(-math.pi, math.pi)])
     goal = np.array([gx, gy, random.uniform(-math.pi, math.pi) if task.turned else math.nan])
-    job = _job(room, item, task.turned)
-    job.begin([goal])
     radius = robot.footprint_radius
     outline = se2.transform(item.mass_pose(start), item.geometry.outline)
     begin = scattered(random, task.robots, FreeSpace(rasterise(room)), outline, radius)
     doubt = uncertainty(task.uncertainty)
     with GroupWorld(room, robot, begin, item, start, doubt, task.seed, task.world) as world:
-        ways, phases = drive(job, world, item, task.limit)
+        if task.lost is None:
+            job = _job(room, item, task.turned)
+            job.begin([goal])
+            ways, phases = drive(job, world, item, task.limit)
+        else:
+            jobs = [_job(room, item, task.turned) for _ in world.names]
+            ways = drive_agents(jobs, goal, world, item, task)
+            job, phases = jobs[0], {}
         taken, drawn = world.time, world.drawn
         away, turned = job.errors(item.mass_pose(world.truth()[0]))
     task.trace.parent.mkdir(parents=True, exist_ok=True)
@@ -114,6 +122,31 @@ def run(task: MapTask) -> Row:
         row["way_m"] = float(np.hypot(*np.diff(ways[:, 0, :2], axis=0).T).sum())
     row |= {f"{name.replace(' ', '_')}_s": spent for name, spent in phases.items()}
     return row | drawn
+
+
+def drive_agents(
+    jobs: list[SwarmJob], goal: Array, world: GroupWorld, item: ObjectSpec, task: MapTask
+) -> Array:
+    """The same where every robot decides for itself: poses ``(t, 1 + n, 3)`` now and then."""
+    assert task.lost is not None
+    settings = AgentSettings(decentralised=True, lost=task.lost, seed=task.seed)
+    agents = [Agent(n, job, settings) for n, job in zip(world.names, jobs, strict=True)]
+    for agent in agents:
+        agent.job.begin([goal])
+    ways, words, none, tick = [], list[Word](), np.zeros((0, 3)), 0
+    while world.time < task.limit and any(a.job.busy for a in agents):
+        seen, robots = world.see()
+        pose = item.mass_pose(seen)
+        for agent in agents:
+            for word in words:
+                agent.hear(word)
+        told = [a.step(world.time, pose, p, none) for a, p in zip(agents, robots, strict=True)]
+        words = [word for _, word in told]
+        if tick % TRACE == 0:
+            ways.append(np.vstack([*world.truth()]))
+        world.step(np.array([twist for twist, _ in told]))
+        tick += 1
+    return np.array(ways)
 
 
 def _job(room: EnvironmentSpec, item: ObjectSpec, turned: bool) -> SwarmJob:

@@ -28,7 +28,8 @@ REACHED = 0.1  # [m] from a target, as printed
 _MARGIN = 1.2  # [m] about the targets
 _AROUND = 1.0  # [m] about the object that robots start in
 _GAP = 0.02  # [m] between all at the start
-_TRACE = 10  # ticks between points of a way that are kept
+TRACE = 10
+"""Ticks between points of a way that are kept."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +130,7 @@ def drive(
         if job.last is not None:
             name = job.last.phase.value
             phases[name] = phases.get(name, 0.0) + TICK
-        if tick % _TRACE == 0:
+        if tick % TRACE == 0:
             ways.append(np.vstack([*world.truth()]))
         world.step(np.array([twists[n] for n in world.names]))
         tick += 1

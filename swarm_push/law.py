@@ -27,7 +27,8 @@ class Scene:
 
     time: [s]. pose ``(3,)`` of the object's centre of mass. robots ``(n, 2)`` [m]. target ``(3,)``:
     where the centre of mass is to be, its heading nan where any will do. others ``(k, 3)`` x, y,
-    radius [m] of what stands about: robots that do not move, other bodies.
+    radius [m] of what stands about: robots that do not move, other bodies. mean ``(2,)`` [m] of all
+    robots, where these are not all.
     """
 
     time: float
@@ -35,6 +36,7 @@ class Scene:
     robots: Array
     target: Array
     others: Array
+    mean: Array | None = None
 
 
 @dataclass(frozen=True)

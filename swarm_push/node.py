@@ -1,6 +1,8 @@
 """The swarm's node: targets in, velocities of all robots that are seen out.
 
-Every frame of the pose stream is answered with one message on ``cmd_vels``.
+Every frame of the pose stream is answered with one message on ``cmd_vels``; where robots decide for
+themselves (``agent_node.py``), with the target that they have: then this node only takes goals,
+watches, and tells how the job stands.
 """
 
 import math
@@ -14,31 +16,26 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from std_msgs.msg import Header
 
-from push_estimation.pose_gate import PoseGateSettings, Stamp
+from push_estimation.pose_gate import Stamp
 from push_model.arrays import Array
 from push_model.free_space import FreeSpace
 from push_model.jobs import GoalRefused, JobError, JobPhase
 from push_model.occupancy import OccupancyGrid as Grid
 from push_msgs.action import MoveObject, SwarmMove
-from push_msgs.msg import SwarmStatus, Velocities
+from push_msgs.msg import SwarmStatus, SwarmTarget, Velocities
 from push_ros.actions import GoalServer
 from push_ros.conversions import grid_from_ros
 from push_ros.diagnostics import Diagnostics
 from push_ros.job_intake import JobIntake
 from push_ros.names import names_of
-from push_ros.parameters import declare_settings
 from push_ros.pose_feed import Frame, PoseFeed
 from push_ros.process import run_node
 from push_ros.qos import COMMAND, LATCHED, STATUS
 from push_ros.validation import InvalidMessage
 from push_scenario.scenario import Scenario, load_scenario
-from swarm_push.crescent_law import CrescentLawSettings
-from swarm_push.laws import LawSections, LawSettings
-from swarm_push.object_track import TrackSettings
-from swarm_push.region import covered_region
-from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
-from swarm_push.swarm_messages import status_to_ros, targets_from_ros
-from swarm_push.thesis_law import ThesisLawSettings
+from swarm_push.parameters import declare_swarm
+from swarm_push.swarm_job import SwarmJob
+from swarm_push.swarm_messages import status_to_ros, target_to_ros, targets_from_ros
 
 _PATIENCE = 10.0  # [s] wall time for poses
 
@@ -65,20 +62,7 @@ class SwarmNode(Node):
         item = str(self.declare_parameter("object", item).value)
         _, self._robot = scenario.robot(self.robots[0])
         self.object, self._item = scenario.object(item)
-        values = dict(scenario.parameters.get("swarm", {}))
-        sections = {k: values.pop(k, {}) for k in ("law", "crescent", "thesis", "track", "poses")}
-        self._settings = declare_settings(self, SwarmJobSettings, values, where="swarm")
-        self._laws = LawSections(
-            declare_settings(self, LawSettings, sections["law"], "law", "swarm.law"),
-            declare_settings(
-                self, CrescentLawSettings, sections["crescent"], "crescent", "swarm.crescent"
-            ),
-            declare_settings(self, ThesisLawSettings, sections["thesis"], "thesis", "swarm.thesis"),
-        )
-        self._track = declare_settings(
-            self, TrackSettings, sections["track"], "track", "swarm.track"
-        )
-        gate = declare_settings(self, PoseGateSettings, sections["poses"], "poses", "swarm.poses")
+        self.settings = declare_swarm(self, scenario)
         self._others = {
             k: r for k, r in scenario.radii.items() if k not in (*self.robots, self.object)
         }
@@ -91,12 +75,17 @@ class SwarmNode(Node):
         self._stamp = Header().stamp
         self._pose = np.zeros(3)
         self._diagnostics = Diagnostics(self, names, self._state)
-        self._commands = self.create_publisher(Velocities, names.world("cmd_vels"), COMMAND)
+        self._commands = self._targets = None
+        if self.settings.agents.decentralised:
+            topic = names.team("swarm_target")
+            self._targets = self.create_publisher(SwarmTarget, topic, COMMAND)
+        else:
+            self._commands = self.create_publisher(Velocities, names.world("cmd_vels"), COMMAND)
         self._status = self.create_publisher(SwarmStatus, names.team("swarm_status"), STATUS)
         self._poses = PoseFeed(
             self,
             names,
-            gate,
+            self.settings.poses,
             [*self.robots, self.object, *self._others],
             self._diagnostics,
             self._on_frame,
@@ -154,7 +143,7 @@ class SwarmNode(Node):
         reach = float(np.hypot(*self._item.outline.T).max())
         roomy = self._space.clearance(goal[None, :2])[0] >= reach
         track, pose = self.job.track, self._item.mass_pose(goal)
-        if not self._settings.orientation:
+        if not self.settings.job.orientation:
             pose = np.array([*goal[:2], math.nan])
         if not (roomy if track is None else track.fits(pose)):
             raise GoalRefused(JobError.GOAL_OCCUPIED, "the object does not fit there")
@@ -162,7 +151,7 @@ class SwarmNode(Node):
     def take_goal(self, goal: Array, plan_only: bool) -> None:
         """See JobOwner."""
         target = self._item.mass_pose(goal)
-        if not self._settings.orientation:
+        if not self.settings.job.orientation:
             target = np.array([*goal[:2], math.nan])
         self._begin([target])
         if plan_only:
@@ -219,18 +208,10 @@ class SwarmNode(Node):
 
     def _job(self, grid: Grid) -> SwarmJob | None:
         """For a map; None where there can be none, for the reason in ``_why_not``."""
-        found = covered_region(grid, self._robot.footprint_radius)
-        if found is None:
-            self._why_not = "the map has no room for a robot"
+        job = self.settings.make_job(grid, self._item, self._robot)
+        if isinstance(job, str):
+            self._why_not = job
             return None
-        region, empty = found
-        if not empty and self._laws.law.law == "thesis":
-            self._why_not = "the map has obstacles, of which the printed law knows nothing"
-            return None
-        walls = None if empty else grid
-        job = SwarmJob(
-            region, self._item, self._robot, self._settings, self._laws, walls, self._track
-        )
         job.warm_up()
         return job
 
@@ -258,14 +239,20 @@ class SwarmNode(Node):
         twists = self.job.step(self._poses.stamp, self._pose, seen, np.array(others).reshape(-1, 3))
         if self.job.last is not None:
             cost, names = time.thread_time() - began, self.job.taking_part
-            law = self._laws.law.law
+            law = self.settings.laws.law.law
             self._status.publish(
                 status_to_ros(self._stamp, self.object, law, names, self.job, self._pose, cost)
             )
         return twists
 
     def _publish(self, twists: dict[str, tuple[float, float]]) -> None:
-        """To every robot, also those that are not seen: they stand."""
+        """To every robot, also those that are not seen: they stand. Or where those that decide for
+        themselves are to bring the object."""
+        if self._targets is not None:
+            target = self.job.target if self.job is not None and self.job.busy else None
+            self._targets.publish(target_to_ros(self._stamp, target))
+            return
+        assert self._commands is not None
         told = [twists.get(name, (0.0, 0.0)) for name in self.robots]
         message = Velocities(
             names=list(self.robots), vx=[v for v, _ in told], omega=[w for _, w in told]
@@ -355,7 +342,7 @@ class SwarmNode(Node):
             "reason": self._told[1] if self._told else "",
             "robots": f"{seen} of {len(self.robots)} seen",
             "robots that do not move": " ".join(dead),
-            "law": self._laws.law.law,
+            "law": self.settings.laws.law.law,
             "poses refused": self._poses.gate.refused,
             "warning": "no poses" if self._poses.pose(self.object) is None else "",
         }

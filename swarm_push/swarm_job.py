@@ -169,10 +169,16 @@ class SwarmJob:
         return math.hypot(pose[0] - target[0], pose[1] - target[1]), turn
 
     def step(
-        self, now: float, pose: Array, robots: Mapping[str, Array], others: Array
+        self,
+        now: float,
+        pose: Array,
+        robots: Mapping[str, Array],
+        others: Array,
+        mean: Array | None = None,
     ) -> dict[str, tuple[float, float]]:
         """Twists v [m/s], omega [rad/s] by name. pose ``(3,)`` of the centre of mass; robots: poses
-        by name, of those seen; others ``(k, 3)`` x, y, radius [m] of what else stands about."""
+        by name, of those seen; others ``(k, 3)`` x, y, radius [m] of what else stands about. mean
+        ``(2,)`` [m] of all robots, where only some are seen."""
         if not self.busy:
             return dict.fromkeys(robots, (0.0, 0.0))
         if self._begun is None:
@@ -189,7 +195,8 @@ class SwarmJob:
             return dict.fromkeys(robots, (0.0, 0.0))
         still = [[*robots[n][:2], self._radius] for n in robots if n in self._dead]
         fixed = np.vstack([np.array(still).reshape(-1, 3), others])
-        self.last = step = self._law.step(Scene(now, pose, poses[:, :2], target, fixed))
+        scene = Scene(now, pose, poses[:, :2], target, fixed, mean)
+        self.last = step = self._law.step(scene)
         self.state, self.reason = _STATES[step.phase]
         velocities = self._spaced(step, poses[:, :2], fixed)
         twists = self._drive.follow(velocities, poses[:, 2], self.settings.lead)

@@ -8,8 +8,10 @@ import numpy as np
 
 from push_model.arrays import Array
 from push_model.specs import ObjectSpec
-from push_msgs.msg import SwarmStatus
-from push_ros.validation import FRAME, InvalidMessage, finite
+from push_msgs.msg import SwarmStatus, SwarmTarget, SwarmWord
+from push_ros.conversions import time_from_ros
+from push_ros.validation import FRAME, InvalidMessage, check_frame, finite
+from swarm_push.agent import Word
 from swarm_push.density import Density
 from swarm_push.swarm_job import SwarmJob
 
@@ -70,3 +72,57 @@ def density_from_ros(message: SwarmStatus) -> Density:
         np.column_stack([message.mean_x, message.mean_y]),
         np.array(message.root).reshape(-1, 2, 2),
     )
+
+
+def target_to_ros(stamp: Any, target: Array | None) -> SwarmTarget:
+    """A target ``(3,)`` of the centre of mass, or that there is none."""
+    message = SwarmTarget(active=target is not None)
+    message.header.frame_id, message.header.stamp = FRAME, stamp
+    if target is not None:
+        message.x, message.y, message.theta = (float(v) for v in target)
+    return message
+
+
+def target_from_ros(message: SwarmTarget) -> Array | None:
+    """``(3,)``, its heading nan where any will do; None where there is none.
+
+    Raises
+    ------
+    InvalidMessage
+    """
+    check_frame(message.header.frame_id, "the target")
+    finite((message.x, message.y), "the target")
+    if math.isinf(message.theta):
+        raise InvalidMessage("the target's heading is infinite")
+    if not message.active:
+        return None
+    return np.array([message.x, message.y, message.theta])
+
+
+def word_to_ros(stamp: Any, word: Word) -> SwarmWord:
+    """What a robot says."""
+    message = SwarmWord(robot=word.name, heard=list(word.flows))
+    message.header.frame_id, message.header.stamp = FRAME, stamp
+    message.x, message.y, message.theta = (float(v) for v in word.pose)
+    message.mean_x, message.mean_y = (float(v) for v in word.mean)
+    message.flow_x = [float(f[0]) for f in word.flows.values()]
+    message.flow_y = [float(f[1]) for f in word.flows.values()]
+    return message
+
+
+def word_from_ros(message: SwarmWord) -> Word:
+    """What a robot says.
+
+    Raises
+    ------
+    InvalidMessage
+    """
+    check_frame(message.header.frame_id, "a robot's word")
+    pose, mean = (message.x, message.y, message.theta), (message.mean_x, message.mean_y)
+    if not len(message.heard) == len(message.flow_x) == len(message.flow_y):
+        raise InvalidMessage("a robot's word has flows of another number than robots")
+    flows = np.column_stack([message.flow_x, message.flow_y]).reshape(-1, 2)
+    finite((*pose, *mean, *flows.ravel()), "a robot's word")
+    time = time_from_ros(message.header.stamp)
+    handed = dict(zip(message.heard, flows, strict=True))
+    return Word(message.robot, time, np.array(pose), np.array(mean), handed)

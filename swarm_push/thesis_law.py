@@ -41,7 +41,7 @@ class ThesisLaw:
     def step(self, scene: Scene) -> SwarmStep:
         """See SwarmLaw."""
         s, robots, item = self.settings, scene.robots, scene.pose[:2]
-        mean = robots.mean(axis=0)
+        mean = robots.mean(axis=0) if scene.mean is None else scene.mean
         direction = direction_to(item, scene.target)
         u = swarm_input(mean[None], item, direction, self._radius, s)[0]
         x, y = printed_sigmas(len(robots))

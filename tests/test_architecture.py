@@ -59,9 +59,8 @@ def imported(path):
 
 def is_shell(path):
     """Whether a file may know ROS: the node of a package, and how it talks to other nodes."""
-    return path.name in ("node.py", "torque_node.py", "optimizer_node.py", "peers.py") or (
-        path.name.endswith("_messages.py")
-    )
+    names = ("node.py", "torque_node.py", "optimizer_node.py", "agent_node.py")
+    return path.name in (*names, "parameters.py", "peers.py") or path.name.endswith("_messages.py")
 
 
 FILES = sources()

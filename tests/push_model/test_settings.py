@@ -21,6 +21,7 @@ from push_planner.settings import PlannerSettings
 from push_supervisor.settings import SupervisorSettings
 from sim_bridge.planar_world import PlanarSettings
 from sim_bridge.settings import BridgeSettings, MotionCaptureSettings, PhysicsSettings
+from swarm_push.agent import AgentSettings
 from swarm_push.crescent_law import CrescentLawSettings
 from swarm_push.object_track import TrackSettings
 from swarm_push.swarm_job import SwarmJobSettings
@@ -46,6 +47,7 @@ ALL = (
     CrescentLawSettings,
     ThesisLawSettings,
     TrackSettings,
+    AgentSettings,
 )
 
 

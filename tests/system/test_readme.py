@@ -10,7 +10,7 @@ from rclpy.action import (
 )
 
 from push_ros.claims import own_domain
-from push_scenario.scenario import load_scenario
+from push_scenario.scenario import load_scenario, scenario_from_mapping
 from push_study.graph_run import LockstepRun
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -42,6 +42,8 @@ def names(cell):
 
 GROUP_NODES = {"group": ("group", "/"), "optimizer": ("optimizer", "/")}
 SWARM_NODES = {"swarm": ("swarm", "/")}
+AGENT_NODES = {"swarm_agent": (f"agent_{ROBOT}", "/")}
+CROWD_NODES = {**GROUP_NODES, **SWARM_NODES, **AGENT_NODES}
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +53,22 @@ def graph():
         **look(load_scenario("short"), "single", NODES),
         **look(load_scenario("group-ellipse"), "group", GROUP_NODES),
         **look(load_scenario("swarm-square"), "swarm", SWARM_NODES),
+        **look(two_that_decide_for_themselves(), "swarm", AGENT_NODES),
     }
+
+
+def two_that_decide_for_themselves():
+    names = (ROBOT, "epuck2")
+    values = {
+        "environment": {"size": [3.0, 2.0]},
+        "robots": {
+            n: {"type": "epuck_ring", "start": [-1.0, 0.3 * i, 0.0]} for i, n in enumerate(names)
+        },
+        "objects": {"square": {"type": "swarm_square", "start": [0.0, 0.0, 0.0]}},
+        "goal": [0.5, 0.0, 0.0],
+        "parameters": {"swarm": {"agents": {"decentralised": True}}},
+    }
+    return scenario_from_mapping(values, "two", "test")
 
 
 def look(scenario, system, nodes):
@@ -83,10 +100,10 @@ def look(scenario, system, nodes):
 
 
 def test_every_node_has_a_row_and_no_other():
-    assert {row[0] for row in table("node")[:7]} == {*NODES, *GROUP_NODES, *SWARM_NODES}
+    assert {row[0] for row in table("node")[:8]} == {*NODES, *CROWD_NODES}
 
 
-@pytest.mark.parametrize("node", [*NODES, *GROUP_NODES, *SWARM_NODES])
+@pytest.mark.parametrize("node", [*NODES, *CROWD_NODES])
 def test_what_a_node_hears_tells_serves_and_asks(graph, node):
     (row,) = [r for r in table("node") if r[0] == node]
     for cell, actual in zip(row[1:], graph[node], strict=True):
@@ -101,6 +118,7 @@ def test_settings_and_their_defaults_exist():
     from push_planner import PlannerSettings
     from push_supervisor import SupervisorSettings
     from sim_bridge.settings import BridgeSettings, MotionCaptureSettings
+    from swarm_push.agent import AgentSettings
     from swarm_push.laws import LawSettings
     from swarm_push.swarm_job import SwarmJobSettings
 
@@ -114,7 +132,7 @@ def test_settings_and_their_defaults_exist():
         "supervisor": (SupervisorSettings(), {}),
         "group": (GroupJobSettings(), {"control": GroupControlSettings()}),
         "optimizer": (StepSettings(), {}),
-        "swarm": (SwarmJobSettings(), {"law": LawSettings()}),
+        "swarm": (SwarmJobSettings(), {"law": LawSettings(), "agents": AgentSettings()}),
     }
     lines = (ROOT / "README.md").read_text().splitlines()
     start = next(i for i, line in enumerate(lines) if line.startswith("| node | parameter |"))

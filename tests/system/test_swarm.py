@@ -169,3 +169,34 @@ def test_the_rest_finish_when_robots_die_and_leave():
         assert state is not None and state.error_code == 0, state.reason
         assert {len(m.robots) for m in told} >= {8, 7}
         assert any({"e1", "e2"} & set(m.dead) for m in told)
+
+
+def decentralised(**agents):
+    swarm = {"agents": {"decentralised": True, **agents}}
+    robots = {"e": {**VALUES["robots"]["e"], "count": 5}}
+    return {"parameters": {**VALUES["parameters"], "swarm": swarm}, "robots": robots}
+
+
+def test_robots_that_decide_for_themselves_reach_a_pose_with_messages_lost():
+    with running(**decentralised(lost=0.1)) as run:
+        run.start()
+        goal = np.array([0.6, 0.2, 0.4])
+        state = run.reach(goal)
+        assert state is not None and state.error_code == 0, state.reason
+        off = run.observer.trace.object[-1] - goal
+        assert np.hypot(*off[:2]) < 0.03 and abs(math.remainder(off[2], 2.0 * math.pi)) < 0.06
+
+
+def test_they_stand_when_a_job_is_canceled_and_go_on_with_the_next():
+    with running(**decentralised()) as run:
+        run.start()
+        run.teams[""].send_goal(np.array(VALUES["goal"]))
+        assert run.spin_until(lambda: run.observer.state.state == JobState.PUSHING, 60.0)
+        run.supervisor.end_job(JobError.CANCELED, "enough")
+        run.spin_until(lambda: False, 0.5)
+        before = run.bridge.world.poses()
+        run.spin_until(lambda: False, 1.0)
+        after = run.bridge.world.poses()
+        assert max(np.abs(after[n] - before[n]).max() for n in before) < 1e-3
+        run.teams[""].send_goal(np.array(VALUES["goal"]))
+        assert run.spin_until(lambda: run.observer.state.state == JobState.PUSHING, 60.0)

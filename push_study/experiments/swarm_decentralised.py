@@ -1,0 +1,23 @@
+"""The maps of swarm-maps, by robots that decide for themselves; messages are lost at random."""
+
+from push_study.pool import Row
+from push_study.study import StudyOptions
+from push_study.swarm_map import MAPS, MapTask, run
+from push_study.swarm_maps import conclude, tasks_of
+
+__all__ = ["CHOOSES_WORLD", "SCENARIOS", "conclude", "tasks", "trial"]
+
+SCENARIOS = tuple(MAPS)
+CHOOSES_WORLD = True
+LOST = 0.1
+"""Part of the messages that get lost."""
+
+
+def tasks(options: StudyOptions) -> list[MapTask]:
+    """Every map with every object, to poses."""
+    return tasks_of(options, (True,), LOST)
+
+
+def trial(task: MapTask) -> Row:
+    """To the goal of its map."""
+    return run(task)

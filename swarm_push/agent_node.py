@@ -1,0 +1,176 @@
+"""The node of one robot of a swarm that decides for itself.
+
+It answers every frame of the pose stream with its robot's velocity and a word to those about it. Of
+the stream it takes its own pose, the object's, and those of bodies that are no robots of its swarm;
+the others' it has from their words, of which those from too far off and some more are lost.
+"""
+
+import sys
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import TwistStamped
+from nav_msgs.msg import OccupancyGrid
+from rclpy.node import Node
+from std_msgs.msg import Header
+
+from push_estimation.pose_gate import Stamp
+from push_model.arrays import Array
+from push_model.occupancy import OccupancyGrid as Grid
+from push_msgs.msg import SwarmTarget, SwarmWord
+from push_ros.conversions import grid_from_ros, time_from_ros
+from push_ros.diagnostics import Diagnostics
+from push_ros.names import names_of
+from push_ros.pose_feed import Frame, PoseFeed
+from push_ros.process import run_node
+from push_ros.qos import CHATTER, COMMAND, LATCHED
+from push_ros.validation import InvalidMessage
+from push_scenario.scenario import Scenario, load_scenario
+from swarm_push.agent import Agent, Word
+from swarm_push.parameters import declare_swarm
+from swarm_push.swarm_messages import target_from_ros, word_from_ros, word_to_ros
+
+
+class SwarmAgentNode(Node):
+    """One robot."""
+
+    def __init__(
+        self,
+        scenario: Scenario | None = None,
+        robot: str = "",
+        robots: tuple[str, ...] = (),
+        item: str = "",
+        namespace: str = "",
+        world: str = "",
+    ) -> None:
+        """robot: this one; robots, item: the swarm's. namespace: the team's; world: the bridge's,
+        where it is another one."""
+        super().__init__(f"agent_{robot}" if robot else "agent", namespace=namespace)
+        names = names_of(self, world)
+        name = self.declare_parameter("scenario", "swarm-square").value
+        scenario = scenario or load_scenario(str(name))
+        self.robot, self._spec = scenario.robot(str(self.declare_parameter("robot", robot).value))
+        given = self.declare_parameter("robots", list(robots) or [""]).value
+        self._team = frozenset(r for r in given if r) or frozenset(scenario.robots)
+        self.object, self._item = scenario.object(str(self.declare_parameter("object", item).value))
+        self.settings = declare_swarm(self, scenario)
+        self._others = {
+            k: r for k, r in scenario.radii.items() if k not in self._team and k != self.object
+        }
+        self.agent: Agent | None = None
+        self._why_not = "there is no map yet"
+        self._grid: Grid | None = None
+        self._target: Array | None = None
+        self._told = -np.inf  # [s] stamp of the last target
+        self._words: list[Word] = []
+        self._diagnostics = Diagnostics(self, names, self._state)
+        topic = names.robot(self.robot, "cmd_vel")
+        self._commands = self.create_publisher(
+            TwistStamped, topic, COMMAND, event_callbacks=self._diagnostics.publisher_events(topic)
+        )
+        self._said = self.create_publisher(SwarmWord, names.team("swarm_words"), CHATTER)
+        for kind, topic, handler, qos in (
+            (SwarmWord, names.team("swarm_words"), self._on_word, CHATTER),
+            (SwarmTarget, names.team("swarm_target"), self._on_target, COMMAND),
+            (OccupancyGrid, names.world("map"), self._on_map, LATCHED),
+        ):
+            events = self._diagnostics.subscription_events(topic)
+            self.create_subscription(kind, topic, handler, qos, event_callbacks=events)
+        self._poses = PoseFeed(
+            self,
+            names,
+            self.settings.poses,
+            [self.robot, self.object, *self._others],
+            self._diagnostics,
+            self._on_frame,
+        )
+
+    # What comes
+
+    def _on_map(self, message: OccupancyGrid) -> None:
+        try:
+            grid = grid_from_ros(message)
+        except InvalidMessage as error:
+            self._diagnostics.refuse("/map", str(error))
+            return
+        if self._grid is not None and self._grid.equals(grid):
+            return
+        self._grid, self.agent = grid, None
+        job = self.settings.make_job(grid, self._item, self._spec)
+        if isinstance(job, str):
+            self._why_not = job
+            return
+        job.warm_up()
+        self.agent = Agent(self.robot, job, self.settings.agents)
+
+    def _on_target(self, message: SwarmTarget) -> None:
+        try:
+            self._target = target_from_ros(message)
+        except InvalidMessage as error:
+            self._diagnostics.refuse("swarm_target", str(error))
+            return
+        self._told = time_from_ros(message.header.stamp)
+
+    def _on_word(self, message: SwarmWord) -> None:
+        try:
+            word = word_from_ros(message)
+        except InvalidMessage as error:
+            self._diagnostics.refuse("swarm_words", str(error))
+            return
+        if word.name in self._team and word.name != self.robot:
+            self._words.append(word)
+
+    # What it does
+
+    def _on_frame(self, frame: Frame) -> None:
+        twist = (0.0, 0.0)
+        if frame.verdict is Stamp.RESET:
+            self._target, self._words, self._told = None, [], -np.inf
+            if self.agent is not None:
+                self.agent.pursue(None)
+        elif frame.verdict is not Stamp.REFUSED:
+            twist = self._tick(frame.stamp)
+        message = TwistStamped(header=Header(stamp=frame.stamp, frame_id="base_link"))
+        message.twist.linear.x, message.twist.angular.z = twist
+        self._commands.publish(message)
+
+    def _tick(self, stamp: Any) -> tuple[float, float]:
+        """It stands while it does not see itself or the object, or nobody tells it a target."""
+        item, own = self._poses.pose(self.object), self._poses.pose(self.robot)
+        agent, now = self.agent, self._poses.stamp
+        if agent is None or item is None or own is None:
+            return 0.0, 0.0
+        # Words of this very frame come before or after it, as it happens: they count at the next.
+        heard = sorted((w for w in self._words if w.time < now), key=lambda w: (w.time, w.name))
+        self._words = [w for w in self._words if w.time >= now]
+        for word in heard:
+            agent.hear(word)
+        agent.pursue(self._target if now - self._told < self.settings.agents.silence else None)
+        bodies = {n: self._poses.pose(n) for n in self._others}
+        others = [[*p[:2], self._others[n]] for n, p in bodies.items() if p is not None]
+        twist, word = agent.step(
+            now, self._item.mass_pose(item), own, np.array(others).reshape(-1, 3)
+        )
+        self._said.publish(word_to_ros(stamp, word))
+        return twist
+
+    def _state(self) -> dict[str, Any]:
+        agent = self.agent
+        if agent is None:
+            return {"state": "IDLE", "reason": self._why_not}
+        return {
+            "state": agent.job.state.name,
+            "reason": agent.job.reason,
+            "robots heard": len(agent.neighbours),
+            "poses refused": self._poses.gate.refused,
+            "warning": "no poses" if self._poses.pose(self.robot) is None else "",
+        }
+
+
+def main() -> int:
+    """Entry point of the process: ``--ros-args`` on its command line."""
+    return run_node(SwarmAgentNode)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
