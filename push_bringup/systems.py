@@ -12,7 +12,7 @@ from typing import Any
 from rclpy.node import Node
 
 from push_model.bumpers import RingBumper
-from push_model.drives import SpeedDrive, TorqueDrive
+from push_model.drives import HolonomicDrive, SpeedDrive, TorqueDrive
 from push_model.settings import SettingsError
 from push_ros.names import inside, space
 from push_scenario.scenario import Scenario
@@ -233,7 +233,7 @@ def torque(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
 
 def _check_crowd(scenario: Scenario, team: Team, system: str) -> str:
     """Who the team is, in words. Raise SettingsError unless it has an object, and round robots of
-    one type with wheels of controlled speed."""
+    one type with wheels of controlled speed, or in a swarm such that go in any direction."""
     whose = f"scenario '{scenario.name}': " + (f"team '{team.name}'" if team.name else "it")
     if not team.robots:
         raise SettingsError(f"{whose} has no robots")
@@ -242,10 +242,11 @@ def _check_crowd(scenario: Scenario, team: Team, system: str) -> str:
     types = [scenario.robots[name][0] for name in team.robots]
     if any(t != types[0] for t in types):
         raise SettingsError(f"{whose} has robots of several types, a {system} is of one type")
-    if not isinstance(types[0].bumper, RingBumper) or not isinstance(types[0].drive, SpeedDrive):
+    drives = (SpeedDrive, HolonomicDrive) if system == "swarm" else (SpeedDrive,)
+    if not isinstance(types[0].bumper, RingBumper) or not isinstance(types[0].drive, drives):
+        driven = "a controlled speed" if system == "swarm" else "wheels of controlled speed"
         raise SettingsError(
-            f"{whose} has robots without a ring bumper and wheels of controlled speed, which "
-            f"a {system} needs"
+            f"{whose} has robots without a ring bumper and {driven}, which a {system} needs"
         )
     return whose
 
@@ -296,7 +297,7 @@ def swarm(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
     Raises
     ------
     SettingsError: a team has no robot or no object, robots of several types, or without a round
-        bumper and wheels of controlled speed.
+        bumper and a controlled speed.
     """
     world = _absolute(namespace)
     nodes = [NodeSpec("bridge", "bridge", world, world)]

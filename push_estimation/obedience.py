@@ -22,15 +22,18 @@ class Obedience:
 
     def step(self, time: float, robots: Array, twists: Array) -> tuple[int, ...]:
         """Indices of the disobedient; robots ``(n, 3)`` poses, twists ``(n, 2)`` v [m/s], omega
-        [rad/s] that they are told from now on. Turns count as ways at a lever, and who is told to
-        go to and fro is not told to go anywhere."""
+        [rad/s] that they are told from now on, or ``(n, 3)`` with a velocity in the fixed frame.
+        Turns count as ways at a lever, and who is told to go to and fro is not told to go
+        anywhere."""
         if self._seen and time - self._seen[-1][0] > _GAP:
             self._seen.clear()
         if self._seen:
             before, _, told, _ = self._seen[-1]
             self._told = self._told + told * (time - before)
-        ahead = np.column_stack([np.cos(robots[:, 2]), np.sin(robots[:, 2])])
-        speeds = np.column_stack([ahead * twists[:, :1], twists[:, 1]])
+        speeds = twists
+        if twists.shape[1] == 2:
+            ahead = np.column_stack([np.cos(robots[:, 2]), np.sin(robots[:, 2])])
+            speeds = np.column_stack([ahead * twists[:, :1], twists[:, 1]])
         self._seen.append((time, np.array(robots), speeds, self._told))
         while time - self._seen[0][0] > self._patience:
             self._seen.popleft()

@@ -10,6 +10,7 @@ from types import TracebackType
 import numpy as np
 
 from push_model.arrays import Array
+from push_model.drives import HolonomicDrive
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
 from push_study.pool import Row
 from push_study.uncertainty import Uncertainty
@@ -50,6 +51,7 @@ class GroupWorld:
             name: (doubt.draw_robot(name, robot, self._random, self.drawn), pose)
             for name, pose in zip(self.names, starts, strict=True)
         }
+        self._holonomic = isinstance(robot.drive, HolonomicDrive)
         kind = world_kind(world)
         self._world = kind.make(
             environment, robots, {OBJECT: (self.item, start)}, kind.settings(), TICK
@@ -80,9 +82,14 @@ class GroupWorld:
         return item + noise[0], robots + noise[1:]
 
     def step(self, twists: Array) -> None:
-        """Go on by a tick; twists ``(n, 2)`` v [m/s], omega [rad/s]."""
-        for name, (v, omega) in zip(self.names, twists, strict=True):
-            self._world.command(name, float(v), float(omega))
+        """Go on by a tick; twists ``(n, 2)`` v [m/s], omega [rad/s], of robots that go in any
+        direction vx, vy [m/s] in the world's frame."""
+        if self._holonomic:
+            still = np.zeros(len(self.names))
+            self._world.command_all(self.names, np.column_stack([twists, still]), fixed_frame=True)
+        else:
+            for name, (v, omega) in zip(self.names, twists, strict=True):
+                self._world.command(name, float(v), float(omega))
         self._world.step(self._steps)
         self.time += TICK
 

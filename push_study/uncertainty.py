@@ -90,7 +90,8 @@ class Uncertainty:
         """What a robot is in this trial; what is drawn is noted by name."""
         grip, drive = self._factor(random), robot.drive
         if isinstance(drive, HolonomicDrive):
-            raise SettingsError(f"{name} has no wheels")
+            drawn[f"{name}_max_force_n"] = drive.max_force * grip
+            return replace(robot, drive=replace(drive, max_force=drive.max_force * grip))
         drive = replace(drive, wheel_friction=drive.wheel_friction * grip)
         drawn[f"{name}_wheel_friction"] = drive.wheel_friction
         return replace(robot, drive=drive)

@@ -15,6 +15,7 @@ from rclpy.node import Node
 from std_msgs.msg import Header
 
 from push_estimation.pose_gate import Stamp
+from push_model import se2
 from push_model.arrays import Array
 from push_model.occupancy import OccupancyGrid as Grid
 from push_msgs.msg import SwarmTarget, SwarmWord
@@ -131,7 +132,12 @@ class SwarmAgentNode(Node):
         elif frame.verdict is not Stamp.REFUSED:
             twist = self._tick(frame.stamp)
         message = TwistStamped(header=Header(stamp=frame.stamp, frame_id="base_link"))
-        message.twist.linear.x, message.twist.angular.z = twist
+        if self.agent is not None and self.agent.job.holonomic:
+            own = self._poses.pose(self.robot)
+            turned = se2.rotation_matrix(-float(own[2])) @ twist if own is not None else twist
+            message.twist.linear.x, message.twist.linear.y = (float(v) for v in turned)
+        else:
+            message.twist.linear.x, message.twist.angular.z = twist
         self._commands.publish(message)
 
     def _tick(self, stamp: Any) -> tuple[float, float]:

@@ -31,7 +31,7 @@ from push_ros.names import names_of
 from push_ros.pose_feed import Frame, PoseFeed
 from push_ros.process import run_node
 from push_ros.qos import COMMAND, LATCHED, STATUS
-from push_ros.validation import InvalidMessage
+from push_ros.validation import FRAME, InvalidMessage
 from push_scenario.scenario import Scenario, load_scenario
 from swarm_push.parameters import declare_swarm
 from swarm_push.swarm_job import SwarmJob
@@ -254,10 +254,14 @@ class SwarmNode(Node):
             return
         assert self._commands is not None
         told = [twists.get(name, (0.0, 0.0)) for name in self.robots]
-        message = Velocities(
-            names=list(self.robots), vx=[v for v, _ in told], omega=[w for _, w in told]
-        )
-        message.header.stamp, message.header.frame_id = self._stamp, "base_link"
+        first, second = [a for a, _ in told], [b for _, b in told]
+        if self.job is not None and self.job.holonomic:
+            message = Velocities(names=list(self.robots), vx=first, vy=second)
+            message.header.frame_id = FRAME
+        else:
+            message = Velocities(names=list(self.robots), vx=first, omega=second)
+            message.header.frame_id = "base_link"
+        message.header.stamp = self._stamp
         self._commands.publish(message)
 
     def _on_watchdog(self) -> None:

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from push_estimation.obedience import Obedience
 from push_model import se2
 from push_model.arrays import Array, Mask
+from push_model.drives import HolonomicDrive
 from push_model.jobs import JobError, JobPhase
 from push_model.object_way import NoObjectWay
 from push_model.occupancy import OccupancyGrid
@@ -60,6 +61,7 @@ class SwarmJob:
     state, reason, error: as in JobState. targets: of the job, poses ``(3,)`` of the centre of mass,
     headings nan where any will do; index: of the one under way; times: [s] that each took. last:
     what the last tick came from, and taking_part: the robots that it is about. region: as given.
+    holonomic: whether robots go in any direction.
     """
 
     def __init__(
@@ -76,14 +78,17 @@ class SwarmJob:
         robots may be. grid: the map, where something stands in it; track: how the object then goes
         round that."""
         self.settings, self.region = settings or SwarmJobSettings(), region
-        self._drive, self._radius = robot.differential, robot.footprint_radius
+        self.holonomic = isinstance(robot.drive, HolonomicDrive)
+        self._drive = None if self.holonomic else robot.differential
+        self._speed, self._radius = robot.max_speed, robot.footprint_radius
         self._walls = None if grid is None else Walls(grid, self._radius)
         self.track = None
         if grid is not None:
             track = track or TrackSettings()
             self.track = ObjectTrack(grid, item.geometry.outline, self._radius, track)
-        speed = self._drive.max_speed
-        self._law = make_law(laws or LawSections(), region, item, self._radius, speed, self._walls)
+        self._law = make_law(
+            laws or LawSections(), region, item, self._radius, self._speed, self._walls
+        )
         self._outline = item.geometry.outline
         self._lever = float(np.hypot(*self._outline.T).max())
         self.state, self.reason, self.error = JobPhase.IDLE, "waiting for a goal", JobError.NONE
@@ -176,9 +181,10 @@ class SwarmJob:
         others: Array,
         mean: Array | None = None,
     ) -> dict[str, tuple[float, float]]:
-        """Twists v [m/s], omega [rad/s] by name. pose ``(3,)`` of the centre of mass; robots: poses
-        by name, of those seen; others ``(k, 3)`` x, y, radius [m] of what else stands about. mean
-        ``(2,)`` [m] of all robots, where only some are seen."""
+        """Commands by name: v [m/s], omega [rad/s] of robots on wheels, vx, vy [m/s] in the fixed
+        frame of robots that go in any direction (``holonomic``). pose ``(3,)`` of the centre of
+        mass; robots: poses by name, of those seen; others ``(k, 3)`` x, y, radius [m] of what else
+        stands about. mean ``(2,)`` [m] of all robots, where only some are seen."""
         if not self.busy:
             return dict.fromkeys(robots, (0.0, 0.0))
         if self._begun is None:
@@ -199,9 +205,11 @@ class SwarmJob:
         self.last = step = self._law.step(scene)
         self.state, self.reason = _STATES[step.phase]
         velocities = self._spaced(step, poses[:, :2], fixed)
-        twists = self._drive.follow(velocities, poses[:, 2], self.settings.lead)
+        twists, moved = velocities, np.column_stack([velocities, np.zeros(len(velocities))])
+        if self._drive is not None:
+            twists = moved = self._drive.follow(velocities, poses[:, 2], self.settings.lead)
         touched = self._touched(pose, poses[:, :2], fixed)
-        self._look_for_dead(now, names, poses, twists, touched)
+        self._look_for_dead(now, names, poses, moved, touched)
         told = {n: (float(v), float(w)) for n, (v, w) in zip(names, twists, strict=True)}
         return {n: told.get(n, (0.0, 0.0)) for n in robots}
 
@@ -227,7 +235,7 @@ class SwarmJob:
         return aim
 
     def _spaced(self, step: SwarmStep, points: Array, fixed: Array) -> Array:
-        s, speed = self.settings, self._drive.max_speed
+        s, speed = self.settings, self._speed
         bodies = np.vstack([points, fixed[:, :2]])
         radii = np.concatenate([np.full(len(points), self._radius), fixed[:, 2]])
         slowed = _limited(step.velocities, speed)

@@ -14,7 +14,7 @@ from push_msgs.action import SwarmMove
 from push_ros.validation import InvalidMessage
 from push_scenario.bodies import load_object, load_robot
 from push_study.group_world import GroupWorld
-from push_study.swarm_run import starts
+from push_study.swarm_run import drive, starts
 from push_study.uncertainty import uncertainty
 from swarm_push.crescent_law import CrescentLawSettings
 from swarm_push.laws import LawSections, LawSettings
@@ -230,3 +230,21 @@ def test_warming_up_leaves_no_trace():
     job.warm_up()
     assert not job.busy and job.error is JobError.NONE and job.target is None
     assert job.last is None and not job.dead and job.index == 0
+
+
+def test_discs_that_go_in_any_direction_reach_a_pose():
+    item, disc = load_object("swarm_square"), load_robot("disc")
+    job = SwarmJob(REGION, item, disc, SwarmJobSettings(), LawSections())
+    assert job.holonomic
+    target = np.array([0.7, -0.5, 1.0])
+    job.begin([target])
+    begin = starts(np.random.default_rng(5), 12, item, disc.footprint_radius)
+    room = EnvironmentSpec((2 * HALF, 2 * HALF), resolution=0.05)
+    with GroupWorld(
+        room, disc, begin, item, np.zeros(3), uncertainty("mild"), 5, "planar"
+    ) as world:
+        drive(job, world, item, 200.0)
+        pose = world.truth()[0]
+    assert job.error is JobError.NONE, job.reason
+    assert np.hypot(*(pose - target)[:2]) < 0.022
+    assert abs(se2.wrap(pose[2] - target[2])) < 0.055

@@ -1,0 +1,99 @@
+"""Other people's swarms, and the experiment that sets them beside ours."""
+
+import math
+
+import numpy as np
+import pytest
+
+from push_model import se2
+from push_scenario.bodies import load_object
+from push_study.experiments import swarm_rivals
+from push_study.rivals.gibbs import Gibbs
+from push_study.rivals.global_input import GlobalInput
+from push_study.rivals.occlusion import Occlusion
+from push_study.rivals.rival import Arena
+from push_study.study import StudyOptions
+from push_study.swarm_rival import RIVALS, TARGET, RivalTask, run
+
+SQUARE = load_object("transport_square")
+ARENA = Arena((3.0, 3.0), SQUARE, 0.05, 0.128, np.array(TARGET), 1)
+HERE = np.array([-0.7, -0.7, 0.0])
+
+
+def test_the_global_input_is_the_same_for_all_and_regroups_a_scattered_swarm():
+    rival = GlobalInput(ARENA)
+    random = np.random.default_rng(1)
+    wide = np.column_stack([random.uniform(-1.3, 1.3, (20, 2)), np.zeros(20)])
+    u = rival.velocities(0.0, HERE, wide)
+    assert np.ptp(u, axis=0) == pytest.approx([0.0, 0.0], abs=1e-12)
+    assert np.hypot(*u[0]) == pytest.approx(0.128, rel=1e-6)
+    corner = 1.5 * np.sign(wide[:, :2].mean(axis=0))
+    assert u[0] @ (corner - wide[:, :2].mean(axis=0)) > 0.0
+    behind = np.array([-1.1, -1.1, 0.0]) + 0.02 * random.normal(size=(20, 3))
+    pushed = GlobalInput(ARENA).velocities(0.0, HERE, behind)
+    assert (pushed @ (TARGET - HERE[:2]) > 0.0).all()
+
+
+def test_its_policy_leads_from_everywhere_to_the_target_away_from_walls():
+    rival = GlobalInput(ARENA)
+    for start in np.random.default_rng(2).uniform(-1.2, 1.2, (50, 2)):
+        at = start.copy()
+        for _ in range(200):
+            at = at + 0.03 * rival._direction(at)
+            if np.hypot(*(at - TARGET)) < 0.1:
+                break
+        assert np.hypot(*(at - TARGET)) < 0.1 and np.abs(at).max() < 1.3
+
+
+def test_robots_push_where_the_object_hides_the_goal_and_go_along_it_elsewhere():
+    toward = np.array(TARGET) - HERE[:2]
+    toward /= np.hypot(*toward)
+    robots = np.zeros((2, 3))
+    robots[0, :2], robots[1, :2] = HERE[:2] - 0.36 * toward, HERE[:2] + 0.36 * toward
+    moved = Occlusion(ARENA).velocities(0.0, HERE, robots)
+    assert moved[0] @ toward > 0.6 * 0.128  # hidden from the goal: it pushes
+    assert abs(moved[1] @ toward) < 0.9 * 0.128  # before it: along
+    blocked = np.array([[*(HERE[:2] - away * toward), 0.0] for away in (0.34, 0.43)])
+    assert Occlusion(ARENA).velocities(0.0, HERE, blocked)[1] @ toward < 0.9 * 0.128
+
+
+def test_the_random_field_draws_robots_to_the_object_where_it_hides_the_target():
+    toward = (np.array(TARGET) - HERE[:2]) / np.hypot(*(np.array(TARGET) - HERE[:2]))
+    robots = np.array([[*(HERE[:2] - 0.40 * toward), 0.25 * math.pi]])
+    gone = []
+    for seed in range(20):
+        rival = Gibbs(Arena((3.0, 3.0), SQUARE, 0.05, 0.128, np.array(TARGET), seed))
+        gone.append(rival.velocities(0.0, HERE, robots)[0])
+    assert np.mean(np.array(gone) @ toward) > 0.02
+    assert np.hypot(*np.array(gone).T).max() <= 0.128 + 1e-9
+
+
+@pytest.mark.parametrize("method", list(RIVALS))
+def test_equal_seeds_give_equal_runs(tmp_path, method):
+    rows = [
+        run(RivalTask("transport_square", 3, str(tmp_path), method, 8, "planar", "mild", 20.0))
+        for _ in range(2)
+    ]
+    assert rows[0] == rows[1] and rows[0]["nearest_m"] < 2.0
+    ways = np.load(tmp_path / "ways" / f"transport_square-{method}-3.npz")["ways"]
+    assert np.hypot(*(ways[-1, 1:, :2] - ways[0, 1:, :2]).T).max() > 0.3  # they move
+
+
+def test_a_slice_of_the_experiment_prints_its_table(tmp_path, capsys):
+    options = StudyOptions(("transport_triangle",), 1, 1, tmp_path, world="planar")
+    tasks = swarm_rivals.tasks(options)
+    assert [t.method for t in tasks] == ["crescent", "thesis", "global-input", "occlusion", "gibbs"]
+    rows = [swarm_rivals.trial(tasks[0])]
+    assert rows[0]["success"] and rows[0]["lambda"] < 4.0
+    swarm_rivals.conclude(options, tasks[:1], rows)
+    printed = capsys.readouterr().out
+    assert "1 of 1" in printed and (tmp_path / "lambda.png").is_file()
+
+
+def test_the_object_in_the_rivals_frame_is_where_it_is():
+    """A robot that touches the turned square pushes square to its side."""
+    pose = np.array([-0.7, -0.7, 0.6])
+    robot = se2.transform(pose, np.array([[-0.25, 0.05]]))
+    moved = Occlusion(ARENA).velocities(0.0, pose, np.column_stack([robot, [0.0]]))
+    direction = moved[0] / np.hypot(*moved[0])
+    assert direction @ [math.cos(0.6), math.sin(0.6)] > 0.99
