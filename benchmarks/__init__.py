@@ -18,6 +18,7 @@ NAMES = (
     "physics",
     "stable-push",
     "swarm",
+    "swarm-graph",
     "worlds",
 )
 """Modules of this package with a ``run``; a dash for each underscore."""

@@ -22,6 +22,7 @@ _EVERY = 3  # places of the free space's lattice
 _OUTLINE = 0.03  # [m] between points of the outline that are looked at
 _STEP = 0.02  # [m] between poses of a piece that are looked at
 _TURN = 0.25  # [m] of way that a radian costs
+_SOON = 2  # steps in which an object leaves what it touches
 _LEAST = 5e-3  # [m] of room that an object keeps even where it starts with less
 _TO_LATTICE = 40  # poses of the lattice to which start and goal are tried to join
 
@@ -69,18 +70,21 @@ class WayFinder:
         least: Array = self._space.room(points, among).reshape(len(poses), -1).min(axis=1)
         return least
 
-    def keeps(self, start: Array, motion: Array, among: Obstacles) -> bool:
-        """Whether the object keeps its room on a piece, or comes away where it has less."""
+    def keeps(self, start: Array, motion: Array, among: Obstacles, leaves: bool = False) -> bool:
+        """Whether the object keeps its room on a piece, or comes away where it has less. leaves:
+        whether it may touch something at the start, which it leaves."""
         length = float(np.hypot(*motion[:2])) + self._reach * abs(motion[2])
         parts = np.linspace(0.0, 1.0, max(2, math.ceil(length / _STEP) + 1))
         room = self.clearance(screw_poses(start, motion, parts), among)
-        return self._enough(room)
+        return self._enough(room, leaves)
 
-    def _enough(self, room: Array) -> bool:
+    def _enough(self, room: Array, leaves: bool) -> bool:
         """Where an end has less room than is needed, it only becomes more on the way from it."""
         need = np.minimum(self._room, np.maximum.accumulate(room) - 1e-3)
         back = np.minimum(self._room, np.maximum.accumulate(room[::-1])[::-1] - 1e-3)
-        return bool((room >= np.minimum(need, back)).all() and room.min() >= _LEAST)
+        if leaves and room[0] < _LEAST:  # no room tells touching from being within: it leaves soon
+            room = room[_SOON:]
+        return bool((room >= np.minimum(need, back)[-len(room) :]).all() and room.min() >= _LEAST)
 
     def way(self, start: Array, goal: Array, among: Obstacles) -> ObjectWay:
         """From a pose ``(3,)`` to another, of the centre of mass; where the goal's heading is nan
@@ -92,7 +96,7 @@ class WayFinder:
         """
         straight = np.array([*goal[:2], start[2] if math.isnan(goal[2]) else goal[2]])
         direct = screw_between(start, straight)
-        if self.keeps(start, direct, among):
+        if self.keeps(start, direct, among, leaves=True):
             return ObjectWay(start, direct[None])
         poses = self._lattice_way(start, goal, among)
         return ObjectWay(start, self._few_pieces(poses, among))
@@ -110,7 +114,7 @@ class WayFinder:
         first, second, cost = first[keep], second[keep], cost[keep]
         count = len(poses)
         for node, end in ((count, start), (count + 1, goal)):
-            joined, lengths = self._joined(end, poses, free, among)
+            joined, lengths = self._joined(end, poses, free, among, leaves=node == count)
             if not len(joined):
                 where = "starts" if node == count else "is to go"
                 raise NoObjectWay(f"there is no room for robots about where the object {where}")
@@ -159,7 +163,7 @@ class WayFinder:
         )
 
     def _joined(
-        self, end: Array, poses: Array, free: Mask, among: Obstacles
+        self, end: Array, poses: Array, free: Mask, among: Obstacles, leaves: bool
     ) -> tuple[Array, Array]:
         """Numbers of poses of the lattice that an end has a piece to, and what that costs."""
         off = np.zeros(len(poses)) if math.isnan(end[2]) else poses[:, 2] - end[2]
@@ -169,7 +173,7 @@ class WayFinder:
         near = near[np.argsort(away[near], kind="stable")][:_TO_LATTICE]
         ends = [_headed(end, poses[k]) for k in near]
         keeps = [
-            self.keeps(e, screw_between(e, poses[k]), among)
+            self.keeps(e, screw_between(e, poses[k]), among, leaves)
             for e, k in zip(ends, near, strict=True)
         ]
         near = near[np.array(keeps, dtype=bool)]
@@ -182,7 +186,7 @@ class WayFinder:
             ahead = len(poses) - 1
             while ahead > k + 1:
                 motion = screw_between(poses[k], poses[ahead])
-                if self.keeps(poses[k], motion, among):
+                if self.keeps(poses[k], motion, among, leaves=k == 0):
                     break
                 ahead -= max(1, (ahead - k) // 6)
             motions.append(screw_between(poses[k], poses[ahead]))

@@ -151,9 +151,8 @@ def drive_agents(
 
 def _job(room: EnvironmentSpec, item: ObjectSpec, turned: bool) -> SwarmJob:
     robot, grid = load_robot(ROBOT), rasterise(room)
-    found = covered_region(grid, robot.footprint_radius)
-    assert found is not None
-    region, empty = found
+    region = covered_region(grid, robot.footprint_radius)
+    assert region is not None
     settings = replace(
         SwarmJobSettings(),
         position_tolerance=REACHED,
@@ -161,4 +160,4 @@ def _job(room: EnvironmentSpec, item: ObjectSpec, turned: bool) -> SwarmJob:
         orientation=turned,
         stalled=_STALLED,
     )
-    return SwarmJob(region, item, robot, settings, grid=None if empty else grid)
+    return SwarmJob(region, item, robot, settings, grid=grid)

@@ -120,10 +120,11 @@ def _drive(
 
 
 def _job(room: EnvironmentSpec, item: ObjectSpec, robot: RobotSpec, task: RivalTask) -> SwarmJob:
-    found = covered_region(rasterise(room), robot.footprint_radius)
-    assert found is not None
+    grid = rasterise(room)
+    region = covered_region(grid, robot.footprint_radius)
+    assert region is not None
     settings = replace(SwarmJobSettings(), position_tolerance=REACHED, stalled=task.limit)
     laws = LawSections(law=LawSettings(law=task.method))  # type: ignore[arg-type]
-    job = SwarmJob(found[0], item, robot, settings, laws)
+    job = SwarmJob(region, item, robot, settings, laws, grid)
     job.begin([np.array([*TARGET, math.nan])])
     return job

@@ -9,7 +9,7 @@ from push_model.arrays import Array
 from push_model.free_space import FreeSpace, Obstacles
 from push_model.object_way import NoObjectWay, WayFinder, pieces
 from push_model.occupancy import OccupancyGrid
-from push_model.screws import screw_poses
+from push_model.screws import screw_between, screw_poses
 from push_model.settings import bounded, settings
 
 _LATTICE = 0.02  # [m]
@@ -75,6 +75,13 @@ class ObjectTrack:
         except NoObjectWay:
             way = self._finders[1].way(pose, target, among)
         self._pieces, self._part, self._target = pieces(way), 0.0, np.array(target)
+
+    def go_straight(self, pose: Array, target: Array) -> None:
+        """Take the straight way, whatever stands in it."""
+        heading = pose[2] if math.isnan(target[2]) else target[2]
+        end = np.array([*target[:2], heading])
+        self._pieces, self._part = [(np.array(pose), screw_between(pose, end))], 0.0
+        self._target = np.array(target)
 
     def aim(self, pose: Array) -> tuple[Array, float]:
         """Pose ``(3,)`` that an object at ``(3,)`` is to head for, and how far [m] it is off its

@@ -14,7 +14,7 @@ from swarm_push.agent import AgentSettings
 from swarm_push.crescent_law import CrescentLawSettings
 from swarm_push.laws import LawSections, LawSettings
 from swarm_push.object_track import TrackSettings
-from swarm_push.region import covered_region
+from swarm_push.region import covered_region, is_open
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
 from swarm_push.thesis_law import ThesisLawSettings
 
@@ -34,14 +34,12 @@ class SwarmParameters:
 
     def make_job(self, grid: OccupancyGrid, item: ObjectSpec, robot: RobotSpec) -> SwarmJob | str:
         """For a map; where there can be none, why not."""
-        found = covered_region(grid, robot.footprint_radius)
-        if found is None:
+        region = covered_region(grid, robot.footprint_radius)
+        if region is None:
             return "the map has no room for a robot"
-        region, empty = found
-        if not empty and self.laws.law.law == "thesis":
+        if not is_open(grid) and self.laws.law.law == "thesis":
             return "the map has obstacles, of which the printed law knows nothing"
-        walls = None if empty else grid
-        return SwarmJob(region, item, robot, self.job, self.laws, walls, self.track)
+        return SwarmJob(region, item, robot, self.job, self.laws, grid, self.track)
 
 
 def declare_swarm(node: Node, scenario: Scenario) -> SwarmParameters:

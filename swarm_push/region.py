@@ -6,18 +6,24 @@ from push_model.arrays import Array
 from push_model.occupancy import OccupancyGrid
 
 
-def covered_region(grid: OccupancyGrid, margin: float) -> tuple[Array, bool] | None:
+def is_open(grid: OccupancyGrid) -> bool:
+    """Whether the free cells of a map fill a rectangle."""
+    free = ~grid.occupied
+    inner = free[free.any(axis=1)][:, free.any(axis=0)]
+    return bool(inner.size and inner.all())
+
+
+def covered_region(grid: OccupancyGrid, margin: float) -> Array | None:
     """``(4, 2)`` [m] corners, counter-clockwise, of the rectangle about the free cells of a map,
-    so far [m] from its sides, and whether nothing stands in it; None where there is no room."""
+    so far [m] from its sides; None where there is no room."""
     free = ~grid.occupied
     rows, columns = np.flatnonzero(free.any(axis=1)), np.flatnonzero(free.any(axis=0))
     if not len(rows):
         return None
-    part = free[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     x, y = grid.origin
     left, right = x + columns[0] * grid.resolution, x + (columns[-1] + 1) * grid.resolution
     low, high = y + rows[0] * grid.resolution, y + (rows[-1] + 1) * grid.resolution
     if min(right - left, high - low) <= 2.0 * margin:
         return None
     left, low, right, high = left + margin, low + margin, right - margin, high - margin
-    return np.array([[left, low], [right, low], [right, high], [left, high]]), bool(part.all())
+    return np.array([[left, low], [right, low], [right, high], [left, high]])

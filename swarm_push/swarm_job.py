@@ -10,7 +10,6 @@ from contextlib import suppress
 import numpy as np
 from scipy.spatial import cKDTree
 
-from push_estimation.obedience import Obedience
 from push_model import se2
 from push_model.arrays import Array, Mask
 from push_model.drives import HolonomicDrive
@@ -23,6 +22,8 @@ from push_model.specs import ObjectSpec, RobotSpec
 from swarm_push.law import Scene, SwarmPhase, SwarmStep
 from swarm_push.laws import LawSections, make_law
 from swarm_push.object_track import ObjectTrack, TrackSettings
+from swarm_push.region import is_open
+from swarm_push.roll_call import RollCall
 from swarm_push.spacing import keep_apart
 from swarm_push.walls import Walls
 
@@ -75,17 +76,18 @@ class SwarmJob:
         track: TrackSettings | None = None,
     ) -> None:
         """region: ``(m, 2)`` [m] corners, counter-clockwise, of the convex one in which centres of
-        robots may be. grid: the map, where something stands in it; track: how the object then goes
-        round that."""
+        robots may be. grid: the map; without it an open room, in which the object does not go
+        round anybody; track: how it does."""
         self.settings, self.region = settings or SwarmJobSettings(), region
         self.holonomic = isinstance(robot.drive, HolonomicDrive)
         self._drive = None if self.holonomic else robot.differential
         self._speed, self._radius = robot.max_speed, robot.footprint_radius
-        self._walls = None if grid is None else Walls(grid, self._radius)
-        self.track = None
+        self._walls, self.track = None, None
         if grid is not None:
             track = track or TrackSettings()
             self.track = ObjectTrack(grid, item.geometry.outline, self._radius, track)
+            if not is_open(grid):
+                self._walls = Walls(grid, self._radius)
         self._law = make_law(
             laws or LawSections(), region, item, self._radius, self._speed, self._walls
         )
@@ -95,14 +97,14 @@ class SwarmJob:
         self.targets: tuple[Array, ...] = ()
         self.index = 0
         self.times: list[float] = []
-        self._dead: dict[str, float] = {}  # since when [s]
         self.last: SwarmStep | None = None
         self.taking_part: tuple[str, ...] = ()
-        self._watch: tuple[tuple[str, ...], Obedience, Obedience] | None = None
+        s, wheels = self.settings, not self.holonomic
+        self._roll = RollCall(s.dead, s.dead_way, s.jammed, s.again, wheels)
         self._begun: float | None = None
         self._nearest = math.inf
         self._progress = self._seen = 0.0
-        self._planned = -math.inf
+        self._planned, self._fixed = -math.inf, 0
 
     def warm_up(self) -> None:
         """Load what is compiled, so that the first command does not wait."""
@@ -124,7 +126,7 @@ class SwarmJob:
     @property
     def dead(self) -> frozenset[str]:
         """Robots that do not do as they are told."""
-        return frozenset(self._dead)
+        return frozenset(self._roll.dead)
 
     @property
     def target(self) -> Array | None:
@@ -150,7 +152,7 @@ class SwarmJob:
 
     def _new_way(self) -> None:
         self._law.reset()
-        self._planned = -math.inf
+        self._planned, self._fixed = -math.inf, 0
         if self.track is not None:
             self.track.clear()
 
@@ -162,8 +164,7 @@ class SwarmJob:
 
     def revive(self) -> None:
         """Believe in all robots again: a new job, a reset world, or somebody saw to them."""
-        self._dead = {}
-        self._watch = None
+        self._roll.revive()
 
     def errors(self, pose: Array) -> tuple[float, float]:
         """[m], [rad] from the target that is pursued; no heading counts as none off."""
@@ -192,15 +193,16 @@ class SwarmJob:
             self._nearest = math.inf
         if self._reached(now, pose) or self._given_up(now, pose, robots):
             return dict.fromkeys(robots, (0.0, 0.0))
-        names = tuple(n for n in robots if n not in self._dead)
+        tried = self._roll.try_again(now, robots)
+        names = tuple(n for n in robots if n not in self._roll.dead)
         if not names:
-            return dict.fromkeys(robots, (0.0, 0.0))
+            return {n: tried.get(n, (0.0, 0.0)) for n in robots}
         self.taking_part, poses = names, np.array([robots[n] for n in names])
-        target = self._aim(now, pose, others)
+        still = [[*robots[n][:2], self._radius] for n in robots if n in self._roll.dead]
+        fixed = np.vstack([np.array(still).reshape(-1, 3), others])
+        target = self._aim(now, pose, fixed)
         if target is None:
             return dict.fromkeys(robots, (0.0, 0.0))
-        still = [[*robots[n][:2], self._radius] for n in robots if n in self._dead]
-        fixed = np.vstack([np.array(still).reshape(-1, 3), others])
         scene = Scene(now, pose, poses[:, :2], target, fixed, mean)
         self.last = step = self._law.step(scene)
         self.state, self.reason = _STATES[step.phase]
@@ -209,30 +211,46 @@ class SwarmJob:
         if self._drive is not None:
             twists = moved = self._drive.follow(velocities, poses[:, 2], self.settings.lead)
         touched = self._touched(pose, poses[:, :2], fixed)
-        self._look_for_dead(now, names, poses, moved, touched)
+        tested = self._roll.step(now, names, poses, moved, touched)
+        twists = tested if self._drive is not None else twists
         told = {n: (float(v), float(w)) for n, (v, w) in zip(names, twists, strict=True)}
+        told |= tried
         return {n: told.get(n, (0.0, 0.0)) for n in robots}
 
-    def _aim(self, now: float, pose: Array, others: Array) -> Array | None:
-        """Where the object is to head for: its target, or round walls; None ends the job."""
+    def _aim(self, now: float, pose: Array, fixed: Array) -> Array | None:
+        """Where the object is to head for: its target, or round walls and what stands about; None
+        ends the job."""
         target, track = self.target, self.track
         assert target is not None
-        if track is None:
+        if track is None or (self._walls is None and not len(fixed)):
             return target
-        if not track.under_way:
+        if not track.under_way or len(fixed) != self._fixed:
+            self._fixed, self._planned = len(fixed), now
             try:
-                track.plan(pose, target, others)
+                track.plan(pose, target, fixed)
             except NoObjectWay as error:
-                self.end(JobError.PLANNING_FAILED, str(error))
-                return None
+                if self._walls is None:  # then straight on, and against it
+                    track.go_straight(pose, target)
+                elif not len(fixed) or not self._round_walls(pose, target):
+                    self.end(JobError.PLANNING_FAILED, str(error))
+                    return None
+            self._nearest = math.inf
         aim, off = track.aim(pose)
         if off > track.settings.off and now - self._planned > _PLAN_AGAIN:
             self._planned = now
             with suppress(NoObjectWay):  # back to the way that there is
-                track.plan(pose, target, others)
+                track.plan(pose, target, fixed)
                 aim, _ = track.aim(pose)
                 self._nearest = max(self._nearest, track.left(pose))
         return aim
+
+    def _round_walls(self, pose: Array, target: Array) -> bool:
+        """A way that leads through whoever stands about, where there is none round them."""
+        assert self.track is not None
+        with suppress(NoObjectWay):
+            self.track.plan(pose, target, np.zeros((0, 3)))
+            return True
+        return False
 
     def _spaced(self, step: SwarmStep, points: Array, fixed: Array) -> Array:
         s, speed = self.settings, self._speed
@@ -265,7 +283,7 @@ class SwarmJob:
 
     def _given_up(self, now: float, pose: Array, robots: Mapping[str, Array]) -> bool:
         s = self.settings
-        alive = [n for n in robots if n not in self._dead]
+        alive = [n for n in robots if n not in self._roll.dead]
         if alive:
             self._seen = now
         elif now - self._seen > s.alone:
@@ -299,22 +317,6 @@ class SwarmJob:
         close = np.hypot(*local.T) < self._lever + near
         touched[close] |= distance(self._outline, local[close]) < near
         return touched
-
-    def _look_for_dead(
-        self, now: float, names: tuple[str, ...], poses: Array, twists: Array, touched: Mask
-    ) -> None:
-        """Who stands although it is told to go; in a jam that takes longer to tell. After a while
-        everybody is tried again."""
-        s = self.settings
-        if self._watch is None or self._watch[0] != names:
-            free = Obedience(len(names), s.dead, s.dead_way)
-            self._watch = names, free, Obedience(len(names), s.jammed, s.dead_way)
-        _, free, held_up = self._watch
-        loose = free.step(now, poses, np.where(touched[:, None], 0.0, twists))
-        for i in {*loose, *held_up.step(now, poses, twists)}:
-            self._dead[names[i]] = now
-        for name in [n for n, since in self._dead.items() if now - since > s.again]:
-            del self._dead[name]
 
 
 def _limited(velocities: Array, speed: float) -> Array:

@@ -1,7 +1,7 @@
 """Our laws beside other people's swarms, on common tasks: five objects, twenty e-pucks, one room.
 
 The rivals are reconstructed from their papers, each in a file of ``push_study/rivals``, which says
-what is reconstructed. Ours runs on every trial, the others on every fifth, at least one.
+what is reconstructed. Ours runs on every trial, the others on every tenth, at least one.
 """
 
 from collections.abc import Sequence
@@ -51,7 +51,7 @@ def tasks(options: StudyOptions) -> list[RivalTask]:
         for method in METHODS
         for name in options.scenarios
         for k in range(options.trials)
-        if method == OURS[0] or k % 5 == 0
+        if method == OURS[0] or k % 10 == 0
     ]
 
 

@@ -14,7 +14,7 @@ from push_model.specs import BoxSpec, EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
 from push_study.swarm_map import MAPS, MapTask, load_map, run
 from swarm_push.object_track import ObjectTrack, TrackSettings
-from swarm_push.region import covered_region
+from swarm_push.region import covered_region, is_open
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
 from swarm_push.walls import Walls
 
@@ -128,8 +128,8 @@ def test_without_a_way_there_is_no_track_and_the_job_says_so():
     with pytest.raises(NoObjectWay):
         track.plan(np.array([-1.0, 0.0, 0.0]), np.array([1.1, 0.0, 0.0]), NONE)
     assert not track.fits(np.array([0.5, 0.0, math.nan]))
-    region, empty = covered_region(grid, R)
-    assert not empty
+    region = covered_region(grid, R)
+    assert not is_open(grid)
     job = SwarmJob(region, item, robot, SwarmJobSettings(), grid=grid)
     job.begin([np.array([1.1, 0.0, math.nan])])
     robots = {"e0": np.array([-0.5, 0.0, 0.0])}

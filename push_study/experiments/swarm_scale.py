@@ -1,0 +1,107 @@
+"""How a swarm fares as it grows: discs that bring the square to a position, eight to a thousand."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from push_model.settings import SettingsError
+from push_model.specs import EnvironmentSpec
+from push_scenario.bodies import load_object, load_robot
+from push_study.group_world import GroupWorld
+from push_study.pool import Row
+from push_study.study import StudyOptions
+from push_study.swarm_run import drive, starts
+from push_study.uncertainty import uncertainty
+from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
+
+SCENARIOS = ("swarm_square",)
+"""The object."""
+CHOOSES_WORLD = True
+ROBOTS = (8, 20, 50, 100, 200, 500, 1000)
+DISTANCE = 1.5  # [m]
+REACHED = 0.1  # [m]
+_LIMIT = 300.0  # [s]
+
+
+@dataclass(frozen=True)
+class ScaleTask:
+    """A run. scenario: name of the object; robots: how many discs."""
+
+    scenario: str
+    seed: int
+    robots: int
+    world: str
+    uncertainty: str
+
+
+def tasks(options: StudyOptions) -> list[ScaleTask]:
+    """Every number of discs."""
+    if options.scenarios != SCENARIOS:
+        raise SettingsError(f"swarm-scale is about '{SCENARIOS[0]}' only")
+    world = options.world or "planar"
+    return [
+        ScaleTask(SCENARIOS[0], options.seed + k, count, world, options.uncertainty)
+        for count in ROBOTS
+        for k in range(options.trials)
+    ]
+
+
+def trial(task: ScaleTask) -> Row:
+    """To the position, discs starting anywhere about the object."""
+    item, disc = load_object(task.scenario), load_robot("disc")
+    half = max(2.5, 0.16 * math.sqrt(task.robots) + 1.5)
+    inner = half - disc.footprint_radius
+    region = inner * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    settings = replace(SwarmJobSettings(), position_tolerance=REACHED, stalled=_LIMIT)
+    job = SwarmJob(region, item, disc, settings)
+    job.begin([np.array([DISTANCE, 0.0, math.nan])])
+    random = np.random.default_rng([task.seed, task.robots])
+    begin = starts(random, task.robots, item, disc.footprint_radius)
+    room = EnvironmentSpec((2.0 * half, 2.0 * half), resolution=0.05)
+    doubt = uncertainty(task.uncertainty)
+    with GroupWorld(room, disc, begin, item, np.zeros(3), doubt, task.seed, task.world) as world:
+        drive(job, world, item, _LIMIT)
+        taken = world.time
+    row: Row = {
+        "scenario": task.scenario,
+        "seed": task.seed,
+        "robots": task.robots,
+        "success": job.index == 1,
+        "reason": "" if job.index == 1 else job.reason,
+    }
+    if job.index == 1:
+        row |= {"duration_s": taken, "lambda": taken * disc.max_speed / DISTANCE}
+    return row
+
+
+def conclude(options: StudyOptions, tasks: Sequence[ScaleTask], rows: list[Row]) -> None:
+    """Lambda by the number of discs."""
+    print("\nrobots   reached    time [s]        Lambda")
+    means = []
+    for count in ROBOTS:
+        mine = [r for r in rows if r.get("robots") == count]
+        good = [r for r in mine if r["success"]]
+        if good:
+            times, units = ([r[k] for r in good] for k in ("duration_s", "lambda"))
+            told = f"{np.mean(times):6.1f} +- {np.std(times):4.1f}  {np.mean(units):6.2f}"
+            means.append((count, float(np.mean(units))))
+        else:
+            told = ""
+        if mine:
+            print(f"{count:6d}   {len(good):2d} of {len(mine):<2d}  {told}")
+    figure, ax = plt.subplots(figsize=(5, 3))
+    if means:
+        ax.semilogx(*np.array(means).T, "o-")
+    ax.set_ylim(bottom=0.0)
+    ax.set_xlabel("robots")
+    ax.set_ylabel("Lambda")
+    figure.tight_layout()
+    figure.savefig(options.out / "scale.png", dpi=110)
+    plt.close(figure)
