@@ -15,6 +15,7 @@ import numpy as np
 from push_scenario.bodies import load_object
 from push_study.pool import Row
 from push_study.study import StudyOptions
+from push_study.swarm_figures import draw_figures
 from push_study.swarm_run import SIMULATION, SwarmTask, draw_ways, length
 
 SHAPES = ("swarm_ellipse", "swarm_octagon", "swarm_rectangle", "swarm_flower")
@@ -46,7 +47,7 @@ def tasks_by(law: str, options: StudyOptions) -> list[SwarmTask]:
 
 
 def conclude(options: StudyOptions, tasks: Sequence[SwarmTask], rows: list[Row]) -> None:
-    """Times by shape and size; a box plot; ways of the first trials."""
+    """Times by shape and size; a box plot; ways of the first trials; Figures 4.3 to 4.6."""
     print(f"\nsix targets, {length(SIMULATION):.2f} m straight from one to the next")
     print("object            robots   all six   time [s]              Lambda")
     for name in options.scenarios:
@@ -60,6 +61,7 @@ def conclude(options: StudyOptions, tasks: Sequence[SwarmTask], rows: list[Row])
                     f"  {_spread([r['lambda'] for r in good], 2)}"
                 )
     _boxes(options, rows)
+    draw_figures(options.out)
     for name in options.scenarios:
         firsts = [
             t for t in tasks if t.scenario == name and t.seed == options.seed and t.trace.is_file()

@@ -13,6 +13,7 @@ from push_study.rivals.global_input import GlobalInput
 from push_study.rivals.occlusion import Occlusion
 from push_study.rivals.rival import Arena
 from push_study.study import StudyOptions
+from push_study.swarm_figures import draw_figures
 from push_study.swarm_rival import RIVALS, TARGET, RivalTask, run
 
 SQUARE = load_object("transport_square")
@@ -97,3 +98,9 @@ def test_the_object_in_the_rivals_frame_is_where_it_is():
     moved = Occlusion(ARENA).velocities(0.0, pose, np.column_stack([robot, [0.0]]))
     direction = moved[0] / np.hypot(*moved[0])
     assert direction @ [math.cos(0.6), math.sin(0.6)] > 0.99
+
+
+def test_the_figures_of_chapter_4_are_drawn(tmp_path):
+    draw_figures(tmp_path)
+    assert (tmp_path / "field.png").stat().st_size > 10_000
+    assert (tmp_path / "coverage.png").stat().st_size > 10_000
