@@ -6,6 +6,7 @@ they change places, which costs more than a detour of some centimetres: few piec
 """
 
 import math
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,7 +58,14 @@ class WayFinder:
             ]
         )
         self._reach = float(np.hypot(*outline.T).max())
-        self._on_map: Array | None = None  # clearance of the lattice's poses on the bare map
+        self._on_map: list[Array] = []  # clearance of the lattice's poses on the bare map, if known
+
+    def with_room(self, room: float) -> "WayFinder":
+        """One for the same object that keeps so far [m] from everything; what is known of the map
+        is shared."""
+        other = copy(self)
+        other._room = room
+        return other
 
     def clearance(self, poses: Array, among: Obstacles) -> Array:
         """``(n,)`` [m] of the outline at poses ``(n, 3)``."""
@@ -134,13 +142,13 @@ class WayFinder:
 
     def _lattice_clearance(self, poses: Array, among: Obstacles) -> Array:
         bare = not among.outlines and not len(among.discs)
-        if bare and self._on_map is not None:
-            return self._on_map
+        if bare and self._on_map:
+            return self._on_map[0]
         found = np.concatenate(
             [self.clearance(layer, among) for layer in np.split(poses, _HEADINGS)]
         )
         if bare:
-            self._on_map = found
+            self._on_map.append(found)
         return found
 
     def _edges(self, shape: tuple[int, int]) -> tuple[Array, Array, Array]:

@@ -1,6 +1,7 @@
 """The way of an object round walls, and where on it the object is to head next."""
 
 import math
+from contextlib import suppress
 
 import numpy as np
 
@@ -20,8 +21,9 @@ _SAMPLES = 60  # poses of a piece that an object's place on it is looked for amo
 class TrackSettings:
     """How an object goes round walls."""
 
-    room: float = bounded(0.02, low=0.0, high=1.0, doc="[m] about it, besides robots' diameters")
-    least_room: float = bounded(2e-3, low=0.0, high=1.0, doc="[m] where there is no more")
+    wide: float = bounded(0.2, low=0.0, high=10.0, doc="[m] about it, besides robots' diameters")
+    room: float = bounded(0.02, low=0.0, high=1.0, doc="[m] likewise, where there is no more")
+    least_room: float = bounded(2e-3, low=0.0, high=1.0, doc="[m] where there is not that either")
     ahead: float = bounded(0.25, low=0.01, high=10.0, doc="[m] on its way that it heads for")
     corner: float = bounded(0.03, low=1e-3, high=1.0, doc="[m] from a corner that is passed")
     off: float = bounded(0.06, low=5e-3, high=10.0, doc="[m] from its way: another is looked for")
@@ -36,10 +38,7 @@ class ObjectTrack:
         """outline: ``(k, 2)`` [m] about the centre of mass."""
         self.settings = settings
         space = FreeSpace(grid, _LATTICE)
-        self._finders = [
-            WayFinder(space, outline, 2.0 * radius + spare)
-            for spare in (settings.room, settings.least_room)
-        ]
+        self._finder, self._diameter = WayFinder(space, outline, 0.0), 2.0 * radius
         self._lever = float(np.hypot(*outline.T).max())
         self._target = np.zeros(3)
         self._pieces: list[tuple[Array, Array]] = []
@@ -58,7 +57,7 @@ class ObjectTrack:
         """Whether an object at ``(3,)`` touches no wall; with a heading of nan, in any."""
         headings = np.arange(16) * math.pi / 8.0 if math.isnan(pose[2]) else pose[2:]
         poses = np.array([[*pose[:2], h] for h in headings])
-        room = self._finders[0].clearance(poses, Obstacles())
+        room = self._finder.clearance(poses, Obstacles())
         return bool(room.max() > 0.0)
 
     def plan(self, pose: Array, target: Array, others: Array) -> None:
@@ -69,11 +68,13 @@ class ObjectTrack:
         ------
         NoObjectWay
         """
-        among = Obstacles(discs=others)
-        try:
-            way = self._finders[0].way(pose, target, among)
-        except NoObjectWay:
-            way = self._finders[1].way(pose, target, among)
+        s, among = self.settings, Obstacles(discs=others)
+        for spare in (s.wide, s.room):
+            with suppress(NoObjectWay):
+                way = self._finder.with_room(self._diameter + spare).way(pose, target, among)
+                break
+        else:
+            way = self._finder.with_room(self._diameter + s.least_room).way(pose, target, among)
         self._pieces, self._part, self._target = pieces(way), 0.0, np.array(target)
 
     def go_straight(self, pose: Array, target: Array) -> None:
