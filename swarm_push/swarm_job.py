@@ -223,6 +223,9 @@ class SwarmJob:
         target, track = self.target, self.track
         assert target is not None
         if track is None or (self._walls is None and not len(fixed)):
+            if track is not None and track.under_way:
+                track.clear()
+                self._nearest = math.inf
             return target
         if not track.under_way or len(fixed) != self._fixed:
             self._fixed, self._planned = len(fixed), now
@@ -234,7 +237,7 @@ class SwarmJob:
                 elif not len(fixed) or not self._round_walls(pose, target):
                     self.end(JobError.PLANNING_FAILED, str(error))
                     return None
-            self._nearest = math.inf
+            self._nearest = max(self._nearest, track.left(pose))
         aim, off = track.aim(pose)
         if off > track.settings.off and now - self._planned > _PLAN_AGAIN:
             self._planned = now
