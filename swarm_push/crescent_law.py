@@ -23,6 +23,7 @@ from push_model.specs import ObjectSpec
 from swarm_push.coverage import Coverage
 from swarm_push.crescent import crescent
 from swarm_push.density import Density
+from swarm_push.escape import Escape
 from swarm_push.law import Scene, SwarmPhase, SwarmStep
 from swarm_push.rim import Nearest, Rim
 from swarm_push.walls import Walls
@@ -51,6 +52,9 @@ class CrescentLawSettings:
     least: float = bounded(0.3, low=0.0, high=0.99, doc="part of the approach that makes a place")
     hold: float = bounded(0.25, low=0.0, high=1.0, doc="part of the wrench that may lack to begin")
     patience: float = bounded(3.0, low=0.0, high=600.0, doc="[s] at most for who is in front")
+    stuck: float = bounded(12.0, low=1.0, high=600.0, doc="[s] at a wall until it is left first")
+    budge: float = bounded(0.02, low=1e-3, high=1.0, doc="[m] of motion that is no standing still")
+    escape: float = bounded(0.08, low=1e-3, high=1.0, doc="[m] off a wall then")
     lost: float = bounded(0.7, low=0.0, high=1.0, doc="part that may lack as they push")
 
 
@@ -80,17 +84,22 @@ class CrescentLaw:
         self._pushing = False
         self._hold_since = self._settled = math.inf  # [s] of time
         self._begun_with = 1.0
+        self._escape = None if walls is None else Escape(self._rim, item, radius, walls)
+        self._moved: tuple[float, Array] | None = None  # when and where the object last was
+        self._escaping: tuple[float, Array, Array] | None = None  # until, from where, motion
 
     def reset(self) -> None:
         """See SwarmLaw."""
         self._pushing, self._hold_since, self._settled = False, math.inf, math.inf
+        self._moved = self._escaping = None
 
     def step(self, scene: Scene) -> SwarmStep:
         """See SwarmLaw."""
         s, pose = self.settings, scene.pose
-        twist = self._twist(pose, scene.target)
         local = se2.transform(se2.inverse(pose), scene.robots)
         near = self._fine.nearest(local)
+        there = bool((near[1] > -s.contact).any())
+        twist = self._off_walls(scene.time, pose, self._twist(pose, scene.target), there)
         lacking, held, ahead = self._lacking(near, twist)
         self._look_for_hold(scene.time, lacking, bool(ahead.any()))
         off = -s.press if self._pushing else s.wait
@@ -137,6 +146,30 @@ class CrescentLaw:
         aims = walls.into_room(se2.transform(pose, aims))
         aims, length = walls.round_corners(scene.robots, aims, length, pose[:2])
         return se2.transform(back, aims), length
+
+    def _off_walls(self, now: float, pose: Array, twist: Array, there: bool) -> Array:
+        """The twist that is wanted; where the object is stuck at a wall although robots are there,
+        for a while one off it."""
+        s, escape = self.settings, self._escape
+        if escape is None:
+            return twist
+        if self._moved is None or not there or self._way(pose, self._moved[1]) > s.budge:
+            self._moved = now, pose
+        if self._escaping is not None:
+            until, start, off = self._escaping
+            if now < until and self._way(pose, start) < s.escape:
+                return s.least_speed * self._speed * off
+            self._escaping, self._moved = None, (now, pose)
+        elif now - self._moved[0] > s.stuck:
+            motion = escape.direction(pose, twist)
+            self._moved = now, pose
+            if motion is not None:
+                self._escaping = now + s.stuck, pose, motion
+        return twist
+
+    def _way(self, pose: Array, start: Array) -> float:
+        turn = abs(se2.wrap(float(pose[2] - start[2])))
+        return math.hypot(pose[0] - start[0], pose[1] - start[1]) + self._lever * turn
 
     def _at_rim(self, goals: Array, off: float) -> Array:
         """Centroids ``(n, 2)`` of few robots' parts of the crescent lie behind its line, in the

@@ -31,6 +31,10 @@ class Walls:
         self._reached: tuple[NDArray[np.int64], cKDTree] | None = None
         self._towards = np.full(2, np.inf)
 
+    def clearance(self, points: Array) -> Array:
+        """``(n,)`` [m] of points ``(n, 2)`` to walls."""
+        return self._space.clearance(points)
+
     def free(self, points: Array) -> Mask:
         """Which centres of robots at ``(n, 2)`` [m] are clear of walls."""
         clear: Mask = self._space.clearance(points) >= self._radius
@@ -47,13 +51,22 @@ class Walls:
     def bounds(self, points: Array, rate: float, gap: float) -> Array:
         """``(n, 3)`` a unit vector towards the nearest wall of each robot at ``(n, 2)`` [m], and
         how fast [m/s] it may go along it: so much [1/s] of what is left beyond a gap [m]."""
-        around = points + _STEP * np.array([[[1.0, 0.0]], [[-1, 0]], [[0, 1]], [[0, -1]], [[0, 0]]])
-        east, west, north, south, here = self._space.clearance(around.reshape(-1, 2)).reshape(5, -1)
+        here = self._space.clearance(points)
+        most = rate * (here - self._radius - gap)
+        unit = self.towards(points)
+        most[~unit.any(axis=1)] = np.inf
+        return np.column_stack([unit, most])
+
+    def towards(self, points: Array) -> Array:
+        """``(n, 2)`` unit vectors towards the nearest wall of points ``(n, 2)`` [m]; zero where
+        there is none nearer than others."""
+        around = points + _STEP * np.array([[[1.0, 0.0]], [[-1, 0]], [[0, 1]], [[0, -1]]])
+        east, west, north, south = self._space.clearance(around.reshape(-1, 2)).reshape(4, -1)
         away = np.column_stack([west - east, south - north])
         length = np.hypot(*away.T)
-        unit = away / np.maximum(length, 1e-9)[:, None]
-        most = np.where(length > 1e-6, rate * (here - self._radius - gap), np.inf)
-        return np.column_stack([unit, most])
+        part = np.where(length > 1e-6, 1.0, 0.0) / np.maximum(length, 1e-9)
+        unit: Array = part[:, None] * away
+        return unit
 
     def round_corners(
         self, robots: Array, aims: Array, length: Array, item: Array

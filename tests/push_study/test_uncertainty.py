@@ -59,8 +59,15 @@ def test_none_is_what_is_believed():
     assert row["box_contact_friction"] == believed.object()[1].contact_friction
 
 
-def test_a_robot_without_wheels_and_an_unknown_name_are_refused():
+def test_of_a_robot_without_wheels_the_rest_is_drawn():
+    believed, world, _ = replace(UNCERTAINTIES["mild"]).draw(load_scenario("discs1000"), 1)
+    drive, other = world.robot()[1].drive, believed.robot()[1].drive
+    assert drive.max_force != other.max_force and replace(drive, max_force=1.0) == replace(
+        other, max_force=1.0
+    )
+    assert world.object()[1].contact_friction != believed.object()[1].contact_friction
+
+
+def test_an_unknown_name_is_refused():
     with pytest.raises(SettingsError, match="none, mild, hard"):
         uncertainty("much")
-    with pytest.raises(SettingsError, match="no wheels"):
-        replace(UNCERTAINTIES["mild"]).draw(load_scenario("discs1000"), 1)
