@@ -3,7 +3,8 @@
 Ten e-pucks and the square. Deaths: through the six targets of Table 4.1, right, with and without
 them, from half the time on that all ten take. A moved target: towards one position, and from half
 the way on towards another, beside going to that from the start; times are over the ways that the
-object has to go.
+object has to go, and over those with the arc that robots have to go round the object where its way
+bends: they cannot push on before.
 """
 
 import math
@@ -27,6 +28,7 @@ from push_study.study import StudyOptions
 from push_study.swarm_run import EXPERIMENT, REACHED, ROBOT, drive, starts
 from push_study.uncertainty import uncertainty
 from swarm_push.region import covered_region
+from swarm_push.rim import Rim
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
 
 SCENARIOS = ("swarm_square",)
@@ -65,6 +67,12 @@ class _Run:
 
     def __init__(self, task: UpsetTask) -> None:
         self._task, self._item, self._robot = task, load_object(task.scenario), load_robot(ROBOT)
+
+    @property
+    def beside(self) -> float:
+        """[m] from the object's centre to the robots that push it, on average."""
+        radius = self._robot.footprint_radius
+        return float(np.hypot(*Rim(self._item.geometry.outline, radius, radius).points.T).mean())
 
     def time(
         self,
@@ -141,7 +149,9 @@ def trial(task: UpsetTask) -> Row:
         bend = math.pi - _angle(first, second)
         row |= {"alive_s": alive, "dead_s": dead, "dead_over_alive": dead / alive}
         row |= {"direct_s_per_m": direct / straight, "moved_s_per_m": moved / way}
+        arc = bend * runs.beside
         row |= {"moved_over_direct": (moved / way) / (direct / straight), "bend_rad": bend}
+        row |= {"with_the_arc": (moved / (way + arc)) / (direct / straight), "arc_m": arc}
     return row
 
 
@@ -165,6 +175,7 @@ def conclude(options: StudyOptions, tasks: Sequence[UpsetTask], rows: list[Row])
             f"time with {DEAD} of {ROBOTS} dead from half of it on, over alive",
         ),
         ("moved_over_direct", "time a metre with the target moved, over going there at once"),
+        ("with_the_arc", "the same, with the arc that robots have to go round the object"),
     ):
         values = np.array([r[key] for r in good])
         print(f"{told}: median {np.median(values):.3f}, {values.min():.3f} to {values.max():.3f}")
