@@ -104,7 +104,7 @@ class CrescentLaw:
         self._look_for_hold(scene.time, lacking, bool(ahead.any()))
         off = -s.press if self._pushing else s.wait
         drive = self._rim.drive(twist, self._item.contact_friction)
-        density = crescent(self._rim, pose, drive, off, s.least, self._free_places(pose))
+        density = crescent(self._rim, pose, drive, off, s.least, self._free_places(scene))
         centroids = self._centroids(scene, density)
         goals = self._at_rim(se2.transform(se2.inverse(pose), centroids), off)
         aims, length = self._ways(scene, local, goals)
@@ -128,11 +128,18 @@ class CrescentLaw:
         item[seen] = self._coverage.centroids(scene.robots[seen], density)
         return item
 
-    def _free_places(self, pose: Array) -> Mask | None:
-        """Which places at the object are clear of walls."""
-        if self._walls is None:
+    def _free_places(self, scene: Scene) -> Mask | None:
+        """Which places at the object are clear of walls and of what stands about; None: all."""
+        if self._walls is None and not len(scene.others):
             return None
-        return self._walls.free(se2.transform(pose, self._rim.points))
+        places = se2.transform(scene.pose, self._rim.points)
+        free = np.ones(len(places), dtype=np.bool_)
+        if self._walls is not None:
+            free = self._walls.free(places)
+        others = scene.others
+        away = np.hypot(*(places[:, None] - others[None, :, :2]).transpose(2, 0, 1))
+        free &= (away > self._radius + others[:, 2]).all(axis=1)
+        return free
 
     def _ways(self, scene: Scene, local: Array, goals: Array) -> tuple[Array, Array]:
         """Where robots head for on their ways to goals, all ``(n, 2)`` [m] in the object's frame,

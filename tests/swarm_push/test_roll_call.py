@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from push_model import se2
 from push_model.jobs import JobError
 from push_model.occupancy import rasterise
 from push_model.specs import EnvironmentSpec
@@ -12,7 +13,10 @@ from push_scenario.bodies import load_object, load_robot
 from push_study.group_world import GroupWorld
 from push_study.swarm_run import drive
 from push_study.uncertainty import uncertainty
+from swarm_push.crescent_law import CrescentLaw
+from swarm_push.law import Scene
 from swarm_push.region import covered_region
+from swarm_push.rim import Rim
 from swarm_push.roll_call import RollCall
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
 
@@ -115,3 +119,27 @@ def test_an_object_goes_round_a_robot_that_died_in_its_way(seed):
     assert job.error is JobError.NONE, job.reason
     assert np.hypot(*(pose[:2] - [1.2, 0.0])) < 0.025
     assert job.dead == {"e0"} and np.hypot(*(robots[0] - before)[:2]) < 0.1
+
+
+def test_nobody_is_sent_where_somebody_dead_stands():
+    """Up to four of them at random at the object."""
+    item, robot = load_object("swarm_square"), load_robot("epuck_ring")
+    region, radius = 2.0 * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]]), robot.footprint_radius
+    law = CrescentLaw(region, item, radius, robot.max_speed)
+    rim, random, shut = Rim(item.geometry.outline, radius, 0.01), np.random.default_rng(0), 0
+    for _ in range(200):
+        pose = random.uniform(-1.0, 1.0, 3)
+        at = random.choice(len(rim.points), random.integers(1, 5), replace=False)
+        out = random.uniform(0.0, 0.08, len(at))[:, None]
+        dead = se2.transform(pose, rim.points[at] - out * rim.normals[at])
+        others = np.column_stack([dead, np.full(len(dead), radius)])
+        robots = pose[:2] + random.uniform(-0.8, 0.8, (6, 2))
+        target = np.array([*random.uniform(-1.5, 1.5, 2), math.nan])
+        for some in (others, others[:0]):
+            density = law.step(Scene(0.0, pose, robots, target, some, None)).density
+            away = np.hypot(*(density.means[:, None] - dead).transpose(2, 0, 1)).min()
+            if len(some):
+                assert away > 1.8 * radius  # robots wait 1 cm off the line of contact
+            else:
+                shut += away < 1.8 * radius
+    assert shut > 50  # places that would have been taken
