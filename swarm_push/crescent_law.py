@@ -52,9 +52,8 @@ class CrescentLawSettings:
     least: float = bounded(0.3, low=0.0, high=0.99, doc="part of the approach that makes a place")
     hold: float = bounded(0.25, low=0.0, high=1.0, doc="part of the wrench that may lack to begin")
     patience: float = bounded(3.0, low=0.0, high=600.0, doc="[s] at most for who is in front")
-    stuck: float = bounded(12.0, low=1.0, high=600.0, doc="[s] at a wall until it is left first")
-    budge: float = bounded(0.02, low=1e-3, high=1.0, doc="[m] of motion that is no standing still")
-    escape: float = bounded(0.08, low=1e-3, high=1.0, doc="[m] off a wall then")
+    stuck: float = bounded(12.0, low=1.0, high=600.0, doc="[s] at a wall until it is left")
+    budge: float = bounded(0.02, low=1e-3, high=1.0, doc="[m] onward in that time that will do")
     lost: float = bounded(0.7, low=0.0, high=1.0, doc="part that may lack as they push")
 
 
@@ -84,22 +83,23 @@ class CrescentLaw:
         self._pushing = False
         self._hold_since = self._settled = math.inf  # [s] of time
         self._begun_with = 1.0
-        self._escape = None if walls is None else Escape(self._rim, item, radius, walls)
-        self._moved: tuple[float, Array] | None = None  # when and where the object last was
-        self._escaping: tuple[float, Array, Array] | None = None  # until, from where, motion
+        self._to_go = 0.0  # [m] of all ways of robots
+        self._escape: Escape | None = None
+        if walls is not None:
+            self._escape = Escape(self._rim, item, radius, walls, s.stuck, s.budge)
 
     def reset(self) -> None:
         """See SwarmLaw."""
         self._pushing, self._hold_since, self._settled = False, math.inf, math.inf
-        self._moved = self._escaping = None
+        if self._escape is not None:
+            self._escape.reset()
 
     def step(self, scene: Scene) -> SwarmStep:
         """See SwarmLaw."""
         s, pose = self.settings, scene.pose
         local = se2.transform(se2.inverse(pose), scene.robots)
         near = self._fine.nearest(local)
-        there = bool((near[1] > -s.contact).any())
-        twist = self._off_walls(scene.time, pose, self._twist(pose, scene.target), there)
+        twist = self._off_walls(scene.time, pose, self._twist(pose, scene.target), near)
         lacking, held, ahead = self._lacking(near, twist)
         self._look_for_hold(scene.time, lacking, bool(ahead.any()))
         off = -s.press if self._pushing else s.wait
@@ -108,6 +108,7 @@ class CrescentLaw:
         centroids = self._centroids(scene, density)
         goals = self._at_rim(se2.transform(se2.inverse(pose), centroids), off)
         aims, length = self._ways(scene, local, goals)
+        self._to_go = float(length.sum())
         arrived = length < 3.0 * self._radius
         self._settled = min(self._settled, scene.time) if arrived.all() else math.inf
         phase = self._phase(arrived, held, local)
@@ -121,7 +122,7 @@ class CrescentLaw:
 
     def _centroids(self, scene: Scene, density: Density) -> Array:
         """Robots that do not see the object for walls cover nothing: they make for it."""
-        if self._walls is None:
+        if self._walls is None or self._walls.open:
             return self._coverage.centroids(scene.robots, density)
         item = np.repeat(scene.pose[None, :2], len(scene.robots), axis=0)
         seen = self._walls.sees(scene.robots, item)
@@ -145,7 +146,7 @@ class CrescentLaw:
         """Where robots head for on their ways to goals, all ``(n, 2)`` [m] in the object's frame,
         and how far ``(n,)`` [m] they have to go: round the object, and round walls."""
         way, walls = self._way_round(scene), self._walls
-        if walls is None:
+        if walls is None or walls.open:
             return way.aims(local, goals)
         pose, back = scene.pose, se2.inverse(scene.pose)
         goals = se2.transform(back, walls.into_room(se2.transform(pose, goals)))
@@ -154,29 +155,14 @@ class CrescentLaw:
         aims, length = walls.round_corners(scene.robots, aims, length, pose[:2])
         return se2.transform(back, aims), length
 
-    def _off_walls(self, now: float, pose: Array, twist: Array, there: bool) -> Array:
+    def _off_walls(self, now: float, pose: Array, twist: Array, near: Nearest) -> Array:
         """The twist that is wanted; where the object is stuck at a wall although robots are there,
         for a while one off it."""
-        s, escape = self.settings, self._escape
-        if escape is None:
+        if self._escape is None:
             return twist
-        if self._moved is None or not there or self._way(pose, self._moved[1]) > s.budge:
-            self._moved = now, pose
-        if self._escaping is not None:
-            until, start, off = self._escaping
-            if now < until and self._way(pose, start) < s.escape:
-                return s.least_speed * self._speed * off
-            self._escaping, self._moved = None, (now, pose)
-        elif now - self._moved[0] > s.stuck:
-            motion = escape.direction(pose, twist)
-            self._moved = now, pose
-            if motion is not None:
-                self._escaping = now + s.stuck, pose, motion
-        return twist
-
-    def _way(self, pose: Array, start: Array) -> float:
-        turn = abs(se2.wrap(float(pose[2] - start[2])))
-        return math.hypot(pose[0] - start[0], pose[1] - start[1]) + self._lever * turn
+        there = bool((near[1] > -self.settings.contact).any())
+        off = self._escape.motion(now, pose, twist, self._to_go if there else None)
+        return twist if off is None else self.settings.least_speed * self._speed * off
 
     def _at_rim(self, goals: Array, off: float) -> Array:
         """Centroids ``(n, 2)`` of few robots' parts of the crescent lie behind its line, in the

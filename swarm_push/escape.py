@@ -2,8 +2,8 @@
 
 Motions in all directions, turns among them, are bent to what the walls allow (no point of the
 outline that is beside a wall goes into it); of those that robots at the places which walls leave
-free can push, with the walls that it slides along pushing back, the one nearest to what is wanted
-is taken that is unlike those which were tried at the same place.
+free can push, with the walls that it slides along pushing back, the one is taken after which robots
+have room to push as it is wanted, and that is unlike those which were tried at the same place.
 """
 
 import math
@@ -15,6 +15,7 @@ from push_model import se2
 from push_model.arrays import Array
 from push_model.coulomb import cone_edges
 from push_model.grasp import grasp_matrix
+from push_model.screws import screw_poses
 from push_model.specs import ObjectSpec
 from swarm_push.rim import Rim
 from swarm_push.walls import Walls
@@ -24,17 +25,33 @@ _OUTLINE = 0.03  # [m] between points of the outline that are looked at
 _BESIDE = 0.02  # [m] of room from which on a wall does not matter
 _SLIDES = 1e-6  # part of a motion at most away from a wall that is along it
 _LEAST = 0.1  # of a direction that must be left when it is bent
+_NEARER = 0.3  # [m] of all ways by which robots come nearer to their places
+_ELSEWHERE = 0.3  # [m]
 _SAME = 0.06  # [m] within which a place is the same
 _UNLIKE = 0.7  # cosine between motions below which they are
+_LENGTHS = (0.12, 0.2)  # [m] of motions
+_FAR, _AHEAD = 1.0, 0.1  # what a metre of it counts, and that it leads on
 _LACKING = 0.2  # part of the wrench that free places and walls may lack
 
 
 class Escape:
     """For one object among walls."""
 
-    def __init__(self, rim: Rim, item: ObjectSpec, radius: float, walls: Walls) -> None:
-        """rim: of robots of a radius [m] about the object."""
-        self._rim, self._walls = rim, walls
+    def __init__(
+        self,
+        rim: Rim,
+        item: ObjectSpec,
+        radius: float,
+        walls: Walls,
+        patience: float = 12.0,
+        budge: float = 0.02,
+    ) -> None:
+        """rim: of robots of a radius [m] about the object. patience: [s] without budge [m] onward,
+        nor robots nearer to their places, until it is stuck, and to come off."""
+        self._rim, self._walls, self._patience, self._budge = rim, walls, patience, budge
+        self._mark: tuple[float, Array] | None = None  # since when, and from where
+        self._nearest = math.inf  # [m] of ways to go since then
+        self._leaving: tuple[float, Array, Array, float] | None = None  # until, whence, which way
         corners = item.geometry.outline
         count = max(1, int(np.hypot(*np.diff(corners, axis=0).T).max() / _OUTLINE))
         part = np.linspace(0.0, 1.0, count, endpoint=False)[:, None, None]
@@ -52,48 +69,111 @@ class Escape:
         self._tried: list[Array] = []
         self._units = np.column_stack([level * np.cos(turn), level * np.sin(turn), z])
 
-    def direction(self, pose: Array, wanted: Array) -> Array | None:
-        """``(3,)`` a motion of unit length in the object's frame, turns by its radius of friction;
-        None where there is none (more), then it begins anew. wanted: twist ``(3,)`` in its frame.
-        """
-        if self._stuck is None or self._way(pose, self._stuck) > _SAME:
-            self._stuck, self._tried = pose, []
-        motion = self._best(pose, wanted * self._scale)
-        self._tried = [] if motion is None else [*self._tried, motion]
-        return None if motion is None else motion / self._scale
+    def reset(self) -> None:
+        """Another target."""
+        self._mark, self._leaving = None, None
 
-    def _way(self, pose: Array, start: Array) -> float:
+    def motion(self, now: float, pose: Array, wanted: Array, to_go: float | None) -> Array | None:
+        """``(3,)`` of unit length in the object's frame that leads it off a wall now, if it is to
+        be led so. wanted: twist ``(3,)`` in its frame; to_go: [m] of all ways of robots to their
+        places; None where none is at the object."""
+        if self._leaving is not None:
+            until, start, off, length = self._leaving
+            if now < until and self.way(pose, start) < length:
+                return off
+            self._leaving = self._mark = None
+            if now >= until:
+                self._leave(now, pose, wanted)
+                return None
+        if self._mark is None or to_go is None:
+            self._mark, self._nearest = (now, pose), math.inf
+            return None
+        if to_go < self._nearest - _NEARER or self._onward(pose, wanted) > self._budge:
+            self._mark, self._nearest = (now, pose), to_go
+        elif now - self._mark[0] > self._patience:
+            self._leave(now, pose, wanted)
+        return None
+
+    def _leave(self, now: float, pose: Array, wanted: Array) -> None:
+        found, self._mark = self.direction(pose, wanted), None
+        if found is not None:
+            self._leaving = now + self._patience, pose, *found
+
+    def _onward(self, pose: Array, wanted: Array) -> float:
+        """[m] from the mark along a twist, or to anywhere when that is far."""
+        assert self._mark is not None
+        mark = self._mark[1]
+        way = se2.rotation_matrix(pose[2]).T @ (pose - mark)[:2]
+        moved = np.array([*way, se2.wrap(float(pose[2] - mark[2]))]) * self._scale
+        along = float(moved @ (wanted * self._scale)) / max(float(np.linalg.norm(wanted)), 1e-12)
+        return math.inf if self.way(pose, mark) > _ELSEWHERE else along
+
+    def direction(self, pose: Array, wanted: Array) -> tuple[Array, float] | None:
+        """A motion ``(3,)`` of unit length in the object's frame, turns by its radius of friction,
+        and how far [m] it leads; None where there is none (more), then it begins anew. wanted:
+        twist ``(3,)`` in its frame."""
+        if self._stuck is None or self.way(pose, self._stuck) > _SAME:
+            self._stuck, self._tried = pose, []
+        motions = self._possible(pose)
+        motions = [m for m in motions if all(m @ other < _UNLIKE for other in self._tried)]
+        best, found = math.inf, None
+        for motion in motions:
+            for length in _LENGTHS:
+                after = screw_poses(pose, length * motion / self._scale, np.ones(1))[0]
+                if self._in_walls(after):
+                    break
+                back = se2.rotation_matrix(pose[2] - after[2])  # the twist is wanted in the room
+                here = np.array([*(back @ wanted[:2]), wanted[2]])
+                cost = self._lacking(here, self._pushes(after)) + _FAR * length
+                cost -= _AHEAD * motion @ (wanted * self._scale) / np.linalg.norm(wanted)
+                if cost < best:
+                    best, found = cost, (motion, length)
+        self._tried = [] if found is None else [*self._tried, found[0]]
+        return None if found is None else (found[0] / self._scale, found[1])
+
+    def way(self, pose: Array, start: Array) -> float:
+        """[m] between poses ``(3,)``, turns by the radius of friction."""
         turn = abs(se2.wrap(float(pose[2] - start[2])))
         return math.hypot(*(pose - start)[:2]) + float(self._scale[2]) * turn
 
-    def _best(self, pose: Array, goal: Array) -> Array | None:
-        turned = se2.rotation_matrix(pose[2])
-        free = self._walls.free(self._rim.points @ turned.T + pose[:2])
-        pushes = self._columns[:, free].reshape(3, -1)
-        if not pushes.shape[1]:
-            return None
-        into, motions = self._into_walls(turned, pose), self._units
+    def _possible(self, pose: Array) -> list[Array]:
+        """Motions that free places can push, with the walls pushing back that they slide along."""
+        pushes = self._pushes(pose)
+        into, motions = self._into_walls(pose), self._units
         if into.shape[1]:
             motions = np.array([unit - into @ nnls(into, unit)[0] for unit in motions])
-        length = np.hypot(np.hypot(motions[:, 0], motions[:, 1]), motions[:, 2])
+        length = np.linalg.norm(motions, axis=1)
         motions = motions[length > _LEAST] / length[length > _LEAST, None]
-        for motion in motions[np.argsort(-(motions @ goal))]:
-            if any(motion @ other > _UNLIKE for other in self._tried):
-                continue
+        found = []
+        for motion in motions:
             back = -into[:, motion @ into > -_SLIDES]
-            wrench = self._surface.wrench(motion / self._scale) / self._scale
             columns = np.hstack([pushes, back])
-            if nnls(columns, wrench / np.linalg.norm(wrench))[1] < _LACKING:
-                found: Array = motion
-                return found
-        return None
+            if self._lacking(motion / self._scale, columns) < _LACKING:
+                found.append(motion)
+        return found
 
-    def _into_walls(self, turned: Array, pose: Array) -> Array:
+    def _pushes(self, pose: Array) -> Array:
+        """``(3, k)`` wrenches that robots at the free places can make."""
+        free = self._walls.free(se2.transform(pose, self._rim.points))
+        columns: Array = self._columns[:, free].reshape(3, -1)
+        return columns
+
+    def _lacking(self, twist: Array, columns: Array) -> float:
+        """Part of a twist's wrench that these cannot make."""
+        if not columns.shape[1]:
+            return 1.0
+        wrench = self._surface.wrench(twist) / self._scale
+        return float(nnls(columns, wrench / np.linalg.norm(wrench))[1])
+
+    def _in_walls(self, pose: Array) -> bool:
+        return bool((self._walls.clearance(se2.transform(pose, self._outline)) <= 0.0).any())
+
+    def _into_walls(self, pose: Array) -> Array:
         """``(3, k)`` wrenches of unit forces into the walls that the outline is beside: as motions
         by the scale, what leads into them."""
-        points = self._outline @ turned.T + pose[:2]
+        points = se2.transform(pose, self._outline)
         near = self._walls.clearance(points) < _BESIDE
-        inward = self._walls.towards(points[near]) @ turned
+        inward = self._walls.towards(points[near]) @ se2.rotation_matrix(pose[2])
         G = grasp_matrix(self._outline[near]).reshape(3, -1, 2)
-        into: Array = np.einsum("ikj,kj->ik", G, inward) / self._scale[:, None]
+        into: Array = np.einsum("ikj,kj->ik", G / self._scale[:, None, None], inward)
         return into

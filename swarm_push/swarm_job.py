@@ -22,7 +22,6 @@ from push_model.specs import ObjectSpec, RobotSpec
 from swarm_push.law import Scene, SwarmPhase, SwarmStep
 from swarm_push.laws import LawSections, make_law
 from swarm_push.object_track import ObjectTrack, TrackSettings
-from swarm_push.region import is_open
 from swarm_push.roll_call import RollCall
 from swarm_push.spacing import keep_apart
 from swarm_push.walls import Walls
@@ -82,15 +81,13 @@ class SwarmJob:
         self.holonomic = isinstance(robot.drive, HolonomicDrive)
         self._drive = None if self.holonomic else robot.differential
         self._speed, self._radius = robot.max_speed, robot.footprint_radius
-        self._walls, self.track = None, None
+        walls, self._walls, self.track = None, None, None
         if grid is not None:
+            walls = Walls(grid, self._radius)
+            self._walls = None if walls.open else walls
             track = track or TrackSettings()
             self.track = ObjectTrack(grid, item.geometry.outline, self._radius, track)
-            if not is_open(grid):
-                self._walls = Walls(grid, self._radius)
-        self._law = make_law(
-            laws or LawSections(), region, item, self._radius, self._speed, self._walls
-        )
+        self._law = make_law(laws or LawSections(), region, item, self._radius, self._speed, walls)
         self._outline = item.geometry.outline
         self._lever = float(np.hypot(*self._outline.T).max())
         self.state, self.reason, self.error = JobPhase.IDLE, "waiting for a goal", JobError.NONE

@@ -7,6 +7,7 @@ from scipy.spatial import cKDTree
 from push_model.arrays import Array, Mask
 from push_model.free_space import FreeSpace, Obstacles, Reach
 from push_model.occupancy import OccupancyGrid
+from swarm_push.region import is_open
 
 _LATTICE = 0.05  # [m] of robots' ways
 _SPARE = 0.01  # [m] that ways keep from walls besides the robot's radius
@@ -18,11 +19,11 @@ _STEP = 0.01  # [m] of differences that tell where a wall is
 
 
 class Walls:
-    """For round robots of one radius [m]."""
+    """For round robots of one radius [m]. open: whether they are only round the room."""
 
     def __init__(self, grid: OccupancyGrid, radius: float) -> None:
         """grid: the map, with at least one place where a robot has room."""
-        self.grid, self._radius = grid, radius
+        self.grid, self._radius, self.open = grid, radius, is_open(grid)
         self._space = FreeSpace(grid, _LATTICE)
         roomy = self._space.clearance(self._space.places) >= radius + _SPARE
         self._roomy = self._space.places[roomy]

@@ -143,7 +143,7 @@ def test_words_and_targets_go_through_their_messages():
 def test_they_bring_an_object_to_its_pose_with_messages_lost(tmp_path):
     """A slice of the experiment swarm-decentralised."""
     task = MapTask(
-        "transport_middle", 11, str(tmp_path), "transport_square", 5, True, "planar", "mild",
+        "transport_reference", 11, str(tmp_path), "transport_square", 5, True, "planar", "mild",
         600.0, 0.1,
     )  # fmt: skip
     row = run(task)

@@ -143,7 +143,7 @@ def test_without_a_way_there_is_no_track_and_the_job_says_so():
     [
         ("transport_middle", "l", True, 11),
         ("transport_corner", "circle", False, 12),
-        ("transport_two_corners", "rectangle", True, 1),
+        ("transport_two_corners", "square", True, 1),
     ],
 )
 def test_objects_come_round_walls(tmp_path, name, item, turned, seed):

@@ -75,7 +75,7 @@ def test_words_and_targets_that_are_none_are_refused():
         run.supervisor.end_job(JobError.CANCELED, "enough")
 
 
-def test_the_object_is_not_seen_for_a_while_a_robot_dies_and_the_rest_bring_it_there():
+def test_a_pose_is_reached_although_words_get_lost_the_object_is_not_seen_and_a_robot_dies():
     """Rows 7 and 14."""
     events = [
         {"kind": "drop_poses", "at": 8.0, "bodies": ["box"], "duration": 3.0},
@@ -87,5 +87,7 @@ def test_the_object_is_not_seen_for_a_while_a_robot_dies_and_the_rest_bring_it_t
         goal = np.array([0.6, 0.2, 0.4])
         state = run.reach(goal, 400.0)
         assert state is not None and state.error_code == 0, state and state.reason
+        off = run.observer.trace.object[-1] - goal
+        assert np.hypot(*off[:2]) < 0.03 and abs(math.remainder(off[2], 2.0 * math.pi)) < 0.06
         blind = [speed for when, speed in told if 8.4 < when < 10.9]
         assert len(blind) > 5 * 50 and max(blind) == 0.0

@@ -177,16 +177,6 @@ def decentralised(**agents):
     return {"parameters": {**VALUES["parameters"], "swarm": swarm}, "robots": robots}
 
 
-def test_robots_that_decide_for_themselves_reach_a_pose_with_messages_lost():
-    with running(**decentralised(lost=0.1)) as run:
-        run.start()
-        goal = np.array([0.6, 0.2, 0.4])
-        state = run.reach(goal)
-        assert state is not None and state.error_code == 0, state.reason
-        off = run.observer.trace.object[-1] - goal
-        assert np.hypot(*off[:2]) < 0.03 and abs(math.remainder(off[2], 2.0 * math.pi)) < 0.06
-
-
 def test_they_stand_when_a_job_is_canceled_and_go_on_with_the_next():
     with running(**decentralised()) as run:
         run.start()
