@@ -40,14 +40,15 @@ $(STAMP): $(INTERFACES) pyproject.toml constraints.txt
 demo: $(STAMP)
 	$(BIN)/planar-push demo --out results/demo
 
-# What starts processes in real time runs alone; the rest side by side, each in its own domain.
+# What starts processes in real time runs alone; the rest side by side, each in its own domain; nodes
+# wait for each other now and then, so there are more workers than cores.
 test: lint
-	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not live"
+	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not live"
 	$(BIN)/python -m pytest -m live
 
 # The cores: no nodes, no simulation of whole jobs.
 test-fast: $(STAMP)
-	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not live" --durations=5 $(CORES)
+	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not live" --durations=5 $(CORES)
 
 coverage: $(STAMP)
 	$(BIN)/python -m pytest -n 2 -m "not live" --durations=0 --cov --cov-branch --cov-report=term

@@ -21,7 +21,7 @@ def test_the_line_is_tracked_with_the_constraint_and_the_object_lost_without(
 ):
     for variant in variants:
         task = line_tracking.LineTask("line", 3, str(tmp_path), 0.1, variant, uncertainty)
-        task = replace(task, length=2.0)
+        task = replace(task, length=1.5)
         row = line_tracking.trial(task)
         assert task.trace_file.is_file()
         if variant == "without":

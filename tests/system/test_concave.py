@@ -20,9 +20,7 @@ def scenario(outline, start, goal):
     return scenario_from_mapping(values, "concave", "test")
 
 
-@pytest.mark.parametrize(
-    ("outline", "seed"), [(L, 1), (T, 2), (U, 2), (SLIM, 4)], ids=["L", "T", "U", "slim"]
-)
+@pytest.mark.parametrize(("outline", "seed"), [(L, 1), (T, 2), (SLIM, 4)], ids=["L", "T", "slim"])
 def test_they_reach_their_goals(outline, seed):
     random = np.random.default_rng(seed)
     start = [*random.uniform([-0.5, -0.5, -3.1], [-0.1, 0.5, 3.1]).tolist()]
