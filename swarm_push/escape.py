@@ -82,10 +82,10 @@ class Escape:
             if now < until and self.way(pose, start) < length:
                 return off
             self._leaving = self._mark = None
-            if now >= until:
+            if now >= until and wanted.any():
                 self._leave(now, pose, wanted)
                 return None
-        if self._mark is None or to_go is None:
+        if self._mark is None or to_go is None or not wanted.any():
             self._mark, self._nearest = (now, pose), math.inf
             return None
         if to_go < self._nearest - _NEARER or self._onward(pose, wanted) > self._budge:
@@ -100,22 +100,25 @@ class Escape:
             self._leaving = now + self._patience, pose, *found
 
     def _onward(self, pose: Array, wanted: Array) -> float:
-        """[m] from the mark along a twist, or to anywhere when that is far."""
+        """[m] from the mark along a twist, turns by the radius of friction; what is far counts
+        wherever it leads."""
         assert self._mark is not None
         mark = self._mark[1]
         way = se2.rotation_matrix(pose[2]).T @ (pose - mark)[:2]
         moved = np.array([*way, se2.wrap(float(pose[2] - mark[2]))]) * self._scale
-        along = float(moved @ (wanted * self._scale)) / max(float(np.linalg.norm(wanted)), 1e-12)
+        goal = wanted * self._scale
+        along = float(moved @ goal / np.linalg.norm(goal))
         return math.inf if self.way(pose, mark) > _ELSEWHERE else along
 
     def direction(self, pose: Array, wanted: Array) -> tuple[Array, float] | None:
         """A motion ``(3,)`` of unit length in the object's frame, turns by its radius of friction,
         and how far [m] it leads; None where there is none (more), then it begins anew. wanted:
-        twist ``(3,)`` in its frame."""
+        twist ``(3,)`` in its frame, not zero."""
         if self._stuck is None or self.way(pose, self._stuck) > _SAME:
             self._stuck, self._tried = pose, []
         motions = self._possible(pose)
         motions = [m for m in motions if all(m @ other < _UNLIKE for other in self._tried)]
+        goal = wanted * self._scale / np.linalg.norm(wanted * self._scale)
         best, found = math.inf, None
         for motion in motions:
             for length in _LENGTHS:
@@ -125,7 +128,7 @@ class Escape:
                 back = se2.rotation_matrix(pose[2] - after[2])  # the twist is wanted in the room
                 here = np.array([*(back @ wanted[:2]), wanted[2]])
                 cost = self._lacking(here, self._pushes(after)) + _FAR * length
-                cost -= _AHEAD * motion @ (wanted * self._scale) / np.linalg.norm(wanted)
+                cost -= _AHEAD * float(motion @ goal)
                 if cost < best:
                     best, found = cost, (motion, length)
         self._tried = [] if found is None else [*self._tried, found[0]]

@@ -68,6 +68,29 @@ def test_what_did_not_help_is_not_tried_again_at_the_same_place_until_all_was():
     assert escape.direction(elsewhere, wanted)[0] * scale == pytest.approx(tried[0], abs=0.1)
 
 
+def test_it_is_stuck_when_it_comes_no_further_and_nobody_comes_nearer():
+    item = load_object("transport_square")
+    walls = Walls(rasterise(EnvironmentSpec((2.0, 2.0))), R)
+    here, wanted = np.array([0.0, -0.799, 0.0]), np.array([0.0, 0.1, 0.0])
+
+    def leaves(speed=(0.0, 0.0), nearer=0.0, there=True, twist=wanted):
+        """When [s] it is led off, moving and robots coming nearer at speeds [m/s]."""
+        escape = Escape(Rim(item.geometry.outline, R, 1.5 * R), item, R, walls, 12.0, 0.02)
+        for now in np.arange(0.0, 40.0, 0.1):
+            pose = here + [speed[0] * now, speed[1] * now, 0.0]
+            to_go = 20.0 - nearer * now if there else None
+            if escape.motion(now, pose, twist, to_go) is not None:
+                return now
+        return None
+
+    assert leaves() == pytest.approx(12.0, abs=0.4)
+    assert leaves(speed=(0.002, 0.0)) == pytest.approx(12.0, abs=0.4)  # jostled, not onward
+    assert leaves(speed=(0.0, 0.0018)) is None
+    assert leaves(nearer=0.03) is None
+    assert leaves(there=False) is None
+    assert leaves(twist=np.zeros(3)) is None
+
+
 def test_in_the_open_it_goes_where_it_is_wanted():
     item = load_object("transport_square")
     walls = Walls(rasterise(EnvironmentSpec((3.0, 3.0))), R)
