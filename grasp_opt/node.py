@@ -9,10 +9,6 @@ import time
 from typing import Any
 
 import numpy as np
-from nav_msgs.msg import OccupancyGrid
-from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
-from std_msgs.msg import Header
 
 from grasp_opt.group_control import GroupControlSettings
 from grasp_opt.group_job import GroupJob, GroupJobSettings, Request
@@ -20,7 +16,7 @@ from grasp_opt.group_messages import plan_from_ros, status_to_ros, trajectory_fr
 from grasp_opt.group_push import GroupPushSettings
 from grasp_opt.moves import MoveSettings
 from grasp_opt.object_trajectory import ObjectTrajectory
-from push_estimation.pose_gate import PoseGateSettings, Stamp
+from push_estimation.pose_gate import PoseGateSettings
 from push_model import se2
 from push_model.arrays import Array
 from push_model.free_space import FreeSpace, Obstacles
@@ -30,18 +26,14 @@ from push_model.occupancy import OccupancyGrid as Grid
 from push_msgs.action import MoveObject, PlanGroupPush, PushAlong
 from push_msgs.msg import GroupStatus, Velocities
 from push_ros.actions import GoalClient, GoalServer
-from push_ros.conversions import circles_to_ros, grid_from_ros, pose_stamped_to_ros, pose_to_ros
-from push_ros.diagnostics import Diagnostics
-from push_ros.job_intake import JobIntake
-from push_ros.names import names_of
+from push_ros.conversions import circles_to_ros, pose_stamped_to_ros, pose_to_ros
 from push_ros.parameters import declare_settings
-from push_ros.pose_feed import Frame, PoseFeed
 from push_ros.process import run_node
-from push_ros.qos import COMMAND, LATCHED, STATUS
+from push_ros.qos import COMMAND, STATUS
+from push_ros.team_node import PATIENCE, TeamNode
 from push_ros.validation import InvalidMessage
-from push_scenario.scenario import Scenario, load_scenario
+from push_scenario.scenario import Scenario
 
-_PATIENCE = 10.0  # [s] wall time for the optimizer to be there, and for poses
 _ERRORS = {
     PlanGroupPush.Result.INVALID_GOAL: JobError.INVALID_GOAL,
     PlanGroupPush.Result.UNKNOWN_OBJECT: JobError.UNKNOWN_OBJECT,
@@ -49,7 +41,7 @@ _ERRORS = {
 }
 
 
-class GroupNode(Node):
+class GroupNode(TeamNode):
     """Robots of one type, one object, one job at a time."""
 
     def __init__(
@@ -62,16 +54,9 @@ class GroupNode(Node):
     ) -> None:
         """robots, item: the group's. namespace: the team's; world: the bridge's, where it is
         another one."""
-        super().__init__("group", namespace=namespace)
-        self.names = names = names_of(self, world)
-        name = self.declare_parameter("scenario", "group-ellipse").value
-        scenario = scenario or load_scenario(str(name))
-        given = self.declare_parameter("robots", list(robots) or [""]).value
-        self.robots = tuple(r for r in given if r) or tuple(scenario.robots)
-        item = str(self.declare_parameter("object", item).value)
-        _, self._robot = scenario.robot(self.robots[0])
-        self.object, self._item = scenario.object(item)
-        values = dict(scenario.parameters.get("group", {}))
+        super().__init__("group", "group-ellipse", scenario, robots, item, namespace, world)
+        names = self.names
+        values = dict(self.scenario.parameters.get("group", {}))
         sections = {k: values.pop(k, {}) for k in ("push", "control", "moves", "poses")}
         self.job = GroupJob(
             self._item,
@@ -85,31 +70,13 @@ class GroupNode(Node):
             declare_settings(self, MoveSettings, sections["moves"], "moves", "group.moves"),
         )
         gate = declare_settings(self, PoseGateSettings, sections["poses"], "poses", "group.poses")
-        self._others = {
-            k: r for k, r in scenario.radii.items() if k not in (*self.robots, self.object)
-        }
-        self._grid: Grid | None = None
         self._finder: WayFinder | None = None
         self._asked: Request | None = None
-        self._waiting = self._wanted = time.monotonic()
-        self._told: tuple[JobPhase, str, int] | None = None
-        self._stamp = Header().stamp
-        self._pose = np.zeros(3)
-        self._diagnostics = Diagnostics(self, names, self._state)
+        self._wanted = self._waiting  # since when the optimizer is
         self._commands = self.create_publisher(Velocities, names.world("cmd_vels"), COMMAND)
         self._status = self.create_publisher(GroupStatus, names.team("group_status"), STATUS)
         self._optimizer = GoalClient(self, PlanGroupPush, names.team("plan_group_push"))
-        self._poses = PoseFeed(
-            self,
-            names,
-            gate,
-            [*self.robots, self.object, *self._others],
-            self._diagnostics,
-            self._on_frame,
-        )
-        self._intake = JobIntake(
-            self, names, self._diagnostics, self, "group", list(self.robots), self.object
-        )
+        self.listen(gate)
         self._along = GoalServer(
             self,
             PushAlong,
@@ -119,16 +86,6 @@ class GroupNode(Node):
             start=self._begin_along,
             cancel=lambda: self.end_job(JobError.CANCELED, "canceled"),
             preempt=lambda request: self.end_job(JobError.PREEMPTED, "a trajectory replaces it"),
-        )
-        self.create_subscription(
-            OccupancyGrid,
-            names.world("map"),
-            self._on_map,
-            LATCHED,
-            event_callbacks=self._diagnostics.subscription_events(names.world("map")),
-        )
-        self._watchdog = self.create_timer(
-            0.1, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
         self._publish_state()
 
@@ -143,11 +100,6 @@ class GroupNode(Node):
     def busy(self) -> bool:
         """See JobOwner."""
         return self.job.busy
-
-    @property
-    def plan_ready(self) -> bool:
-        """A group plans a step at a time: there is no plan that waits."""
-        return False
 
     def check_goal(self, goal: Array) -> None:
         """See JobOwner."""
@@ -171,9 +123,6 @@ class GroupNode(Node):
         self.job.end(code, message)
         self._optimizer.forget()
         self._look_after_job()
-
-    def execute(self) -> None:
-        """See JobOwner; there is never a plan that waits."""
 
     # Trajectories
 
@@ -201,33 +150,20 @@ class GroupNode(Node):
 
     # The world
 
-    def _on_map(self, message: OccupancyGrid) -> None:
-        try:
-            grid = grid_from_ros(message)
-        except InvalidMessage as error:
-            self._diagnostics.refuse("/map", str(error))
-            return
-        if self._grid is None or not self._grid.equals(grid):
-            self._grid = grid
-            self._finder = WayFinder(FreeSpace(grid), self._item.geometry.outline, 0.0)
+    def _take_map(self, grid: Grid) -> None:
+        self._grid = grid
+        self._finder = WayFinder(FreeSpace(grid), self._item.geometry.outline, 0.0)
 
-    def _on_frame(self, frame: Frame) -> None:
-        self._stamp = frame.stamp
-        twists = np.zeros((len(self.robots), 2))
-        if frame.verdict is Stamp.RESET:
-            self.job.revive()
-            self.end_job(JobError.CLOCK_RESET, "the clock went back")
-        elif frame.verdict is not Stamp.REFUSED:
-            twists = self._tick()
-        self._publish(twists)
-        self._look_after_job()
+    def _on_reset(self) -> None:
+        self.job.revive()
+        super()._on_reset()
 
-    def _tick(self) -> Array:
-        """Twists ``(n, 2)`` of all robots; they stand while a pose is not known."""
+    def _tick(self) -> dict[str, tuple[float, float]]:
+        """Twists of all robots; they stand while a pose is not known."""
         item = self._poses.pose(self.object)
         robots = [self._poses.pose(name) for name in self.robots]
         if item is None or any(r is None for r in robots):
-            return np.zeros((len(self.robots), 2))
+            return {}
         self._waiting = time.monotonic()
         self._pose = self._item.mass_pose(item)
         began = time.thread_time()
@@ -247,15 +183,16 @@ class GroupNode(Node):
             self._status.publish(
                 status_to_ros(self._stamp, self.object, pushers, step, self._pose, figures, dead)
             )
-        return twists
+        return {n: (float(v), float(w)) for n, (v, w) in zip(self.robots, twists, strict=True)}
 
     def _errors(self, task: ObjectTrajectory, when: float) -> tuple[float, float]:
         off = se2.between(task.sample(when), self._pose)
         return float(np.hypot(off[0], off[1])), abs(float(off[2]))
 
-    def _publish(self, twists: Array) -> None:
+    def _publish(self, twists: dict[str, tuple[float, float]]) -> None:
+        told = [twists.get(name, (0.0, 0.0)) for name in self.robots]
         message = Velocities(
-            names=list(self.robots), vx=twists[:, 0].tolist(), omega=twists[:, 1].tolist()
+            names=list(self.robots), vx=[v for v, _ in told], omega=[w for _, w in told]
         )
         message.header.stamp, message.header.frame_id = self._stamp, "base_link"
         self._commands.publish(message)
@@ -271,9 +208,9 @@ class GroupNode(Node):
         else:  # gone, perhaps to come again: it is asked anew then
             self._asked = None
             self._optimizer.forget()
-        if now - self._wanted > _PATIENCE:
+        if now - self._wanted > PATIENCE:
             self.end_job(JobError.NODE_LOST, "the grasp optimizer is not there")
-        elif now - self._waiting > _PATIENCE:
+        elif now - self._waiting > PATIENCE:
             self.end_job(JobError.POSES_STALE, "poses of the object or a robot do not come")
         self._look_after_job()
 
@@ -287,14 +224,7 @@ class GroupNode(Node):
         elif request is not self._asked and self._optimizer.ready:
             self._asked = request
             self._ask(request)
-        state = (self.job.state, self.job.reason, self.job.pushes)
-        if state == self._told:
-            return
-        ended = self._told is not None and self._told[0] is not JobPhase.IDLE
-        self._told = state
-        self._publish_state()
-        if ended and not self.job.busy:
-            self._finish()
+        self._tell((self.job.state, self.job.reason, self.job.pushes))
 
     def _ask(self, request: Request) -> None:
         goal = PlanGroupPush.Goal(object=self.object, robots=list(self.robots))
@@ -303,9 +233,7 @@ class GroupNode(Node):
         goal.places = [pose_to_ros(pose) for pose in request.robots]
         goal.fewest = request.fewest
         goal.dead = [self.robots[i] for i in request.dead]
-        bodies = {name: self._poses.pose(name) for name in self._others}
-        circles = [[*p[:2], self._others[n]] for n, p in bodies.items() if p is not None]
-        goal.obstacles = circles_to_ros(np.array(circles).reshape(-1, 3))
+        goal.obstacles = circles_to_ros(self.others())
         if request.trajectory is not None:
             task = request.trajectory
             poses = np.array([self._item.geometric_pose(p) for p in task.pose])

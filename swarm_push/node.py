@@ -11,12 +11,7 @@ import time
 from typing import Any
 
 import numpy as np
-from nav_msgs.msg import OccupancyGrid
-from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
-from std_msgs.msg import Header
 
-from push_estimation.pose_gate import Stamp
 from push_model.arrays import Array
 from push_model.free_space import FreeSpace
 from push_model.jobs import GoalRefused, JobError, JobPhase
@@ -24,23 +19,17 @@ from push_model.occupancy import OccupancyGrid as Grid
 from push_msgs.action import MoveObject, SwarmMove
 from push_msgs.msg import SwarmStatus, SwarmTarget, Velocities
 from push_ros.actions import GoalServer
-from push_ros.conversions import grid_from_ros
-from push_ros.diagnostics import Diagnostics
-from push_ros.job_intake import JobIntake
-from push_ros.names import names_of
-from push_ros.pose_feed import Frame, PoseFeed
 from push_ros.process import run_node
-from push_ros.qos import COMMAND, LATCHED, STATUS
+from push_ros.qos import COMMAND, STATUS
+from push_ros.team_node import PATIENCE, TeamNode
 from push_ros.validation import FRAME, InvalidMessage
-from push_scenario.scenario import Scenario, load_scenario
+from push_scenario.scenario import Scenario
 from swarm_push.parameters import declare_swarm
 from swarm_push.swarm_job import SwarmJob
 from swarm_push.swarm_messages import status_to_ros, target_to_ros, targets_from_ros
 
-_PATIENCE = 10.0  # [s] wall time for poses
 
-
-class SwarmNode(Node):
+class SwarmNode(TeamNode):
     """Robots of one type, one object, one job at a time."""
 
     def __init__(
@@ -53,28 +42,12 @@ class SwarmNode(Node):
     ) -> None:
         """robots, item: the swarm's. namespace: the team's; world: the bridge's, where it is
         another one."""
-        super().__init__("swarm", namespace=namespace)
-        self.names = names = names_of(self, world)
-        name = self.declare_parameter("scenario", "swarm-square").value
-        scenario = scenario or load_scenario(str(name))
-        given = self.declare_parameter("robots", list(robots) or [""]).value
-        self.robots = tuple(r for r in given if r) or tuple(scenario.robots)
-        item = str(self.declare_parameter("object", item).value)
-        _, self._robot = scenario.robot(self.robots[0])
-        self.object, self._item = scenario.object(item)
-        self.settings = declare_swarm(self, scenario)
-        self._others = {
-            k: r for k, r in scenario.radii.items() if k not in (*self.robots, self.object)
-        }
+        super().__init__("swarm", "swarm-square", scenario, robots, item, namespace, world)
+        names = self.names
+        self.settings = declare_swarm(self, self.scenario)
         self.job: SwarmJob | None = None
         self._why_not = "there is no map yet"
-        self._grid: Grid | None = None
         self._space: FreeSpace | None = None
-        self._waiting = time.monotonic()
-        self._told: tuple[JobPhase, str, int] | None = None
-        self._stamp = Header().stamp
-        self._pose = np.zeros(3)
-        self._diagnostics = Diagnostics(self, names, self._state)
         self._commands = self._targets = None
         if self.settings.agents.decentralised:
             topic = names.team("swarm_target")
@@ -82,17 +55,7 @@ class SwarmNode(Node):
         else:
             self._commands = self.create_publisher(Velocities, names.world("cmd_vels"), COMMAND)
         self._status = self.create_publisher(SwarmStatus, names.team("swarm_status"), STATUS)
-        self._poses = PoseFeed(
-            self,
-            names,
-            self.settings.poses,
-            [*self.robots, self.object, *self._others],
-            self._diagnostics,
-            self._on_frame,
-        )
-        self._intake = JobIntake(
-            self, names, self._diagnostics, self, "swarm", list(self.robots), self.object
-        )
+        self.listen(self.settings.poses)
         self._moves = GoalServer(
             self,
             SwarmMove,
@@ -102,16 +65,6 @@ class SwarmNode(Node):
             start=self._begin_targets,
             cancel=lambda: self.end_job(JobError.CANCELED, "canceled"),
             preempt=lambda request: self.end_job(JobError.PREEMPTED, "other targets replace it"),
-        )
-        self.create_subscription(
-            OccupancyGrid,
-            names.world("map"),
-            self._on_map,
-            LATCHED,
-            event_callbacks=self._diagnostics.subscription_events(names.world("map")),
-        )
-        self._watchdog = self.create_timer(
-            0.1, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
         self._publish_state()
 
@@ -126,11 +79,6 @@ class SwarmNode(Node):
     def busy(self) -> bool:
         """See JobOwner."""
         return self.job is not None and self.job.busy
-
-    @property
-    def plan_ready(self) -> bool:
-        """A swarm makes no plans."""
-        return False
 
     def check_goal(self, goal: Array) -> None:
         """See JobOwner."""
@@ -163,9 +111,6 @@ class SwarmNode(Node):
             self.job.end(code, message)
         self._look_after_job()
 
-    def execute(self) -> None:
-        """See JobOwner; there is never a plan that waits."""
-
     # Targets
 
     def _refuse_targets(self, request: Any) -> Any:
@@ -193,14 +138,7 @@ class SwarmNode(Node):
 
     # The world
 
-    def _on_map(self, message: OccupancyGrid) -> None:
-        try:
-            grid = grid_from_ros(message)
-        except InvalidMessage as error:
-            self._diagnostics.refuse("/map", str(error))
-            return
-        if self._grid is not None and self._grid.equals(grid):
-            return
+    def _take_map(self, grid: Grid) -> None:
         self.end_job(JobError.PREEMPTED, "the map has changed")
         self._grid, self._space = grid, FreeSpace(grid)
         self.job = self._job(grid)
@@ -215,16 +153,6 @@ class SwarmNode(Node):
         job.warm_up()
         return job
 
-    def _on_frame(self, frame: Frame) -> None:
-        self._stamp = frame.stamp
-        twists: dict[str, tuple[float, float]] = {}
-        if frame.verdict is Stamp.RESET:
-            self.end_job(JobError.CLOCK_RESET, "the clock went back")
-        elif frame.verdict is not Stamp.REFUSED:
-            twists = self._tick()
-        self._publish(twists)
-        self._look_after_job()
-
     def _tick(self) -> dict[str, tuple[float, float]]:
         """Twists of all robots that are seen; they stand while the object is not."""
         item = self._poses.pose(self.object)
@@ -233,10 +161,8 @@ class SwarmNode(Node):
         self._waiting = time.monotonic()
         self._pose = self._item.mass_pose(item)
         seen = {n: p for n in self.robots if (p := self._poses.pose(n)) is not None}
-        bodies = {n: self._poses.pose(n) for n in self._others}
-        others = [[*p[:2], self._others[n]] for n, p in bodies.items() if p is not None]
-        began = time.thread_time()
-        twists = self.job.step(self._poses.stamp, self._pose, seen, np.array(others).reshape(-1, 3))
+        others, began = self.others(), time.thread_time()
+        twists = self.job.step(self._poses.stamp, self._pose, seen, others)
         if self.job.last is not None:
             cost, names = time.thread_time() - began, self.job.taking_part
             law = self.settings.laws.law.law
@@ -269,7 +195,7 @@ class SwarmNode(Node):
         now = time.monotonic()
         if not self.busy or self._poses.paused:
             self._waiting = now
-        elif now - self._waiting > _PATIENCE:
+        elif now - self._waiting > PATIENCE:
             self.end_job(JobError.POSES_STALE, "poses of the object do not come")
 
     # Outputs
@@ -282,13 +208,7 @@ class SwarmNode(Node):
             if job is None
             else (job.state, job.reason, job.index)
         )
-        if state == self._told:
-            return
-        ended = self._told is not None and self._told[0] is not JobPhase.IDLE
-        self._told = state
-        self._publish_state()
-        if ended and not self.busy:
-            self._finish()
+        self._tell(state)
 
     def _publish_state(self) -> None:
         job = self.job
