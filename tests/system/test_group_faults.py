@@ -106,7 +106,7 @@ def test_poses_that_are_none_are_refused_and_change_nothing(run):
 
 def test_the_optimizer_that_is_gone_ends_the_job_after_a_while(run, monkeypatch):
     """Row 11. Robots stand while they wait."""
-    monkeypatch.setattr(grasp_opt.node, "_PATIENCE", 1.0)
+    monkeypatch.setattr(grasp_opt.node, "PATIENCE", 1.0)
     told = commands(run)
     run.planner._server._server.destroy()
     assert run.spinner.until(lambda: not run.supervisor._optimizer.ready, 10.0)
