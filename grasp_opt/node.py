@@ -233,7 +233,7 @@ class GroupNode(TeamNode):
         goal.places = [pose_to_ros(pose) for pose in request.robots]
         goal.fewest = request.fewest
         goal.dead = [self.robots[i] for i in request.dead]
-        goal.obstacles = circles_to_ros(self.others())
+        goal.obstacles = circles_to_ros(self._poses.discs(self._others))
         if request.trajectory is not None:
             task = request.trajectory
             poses = np.array([self._item.geometric_pose(p) for p in task.pose])

@@ -9,7 +9,7 @@ import time
 from typing import Any
 
 import numpy as np
-from nav_msgs.msg import OccupancyGrid, Path
+from nav_msgs.msg import Path
 from rclpy.node import Node
 
 from grasp_opt.group_messages import plan_to_ros, trajectory_from_ros
@@ -22,8 +22,9 @@ from push_model.trajectory import Trajectory
 from push_msgs.action import PlanGroupPush
 from push_msgs.msg import GroupPlan as PlanMessage
 from push_ros.actions import GoalServer
-from push_ros.conversions import circles_from_ros, grid_from_ros, path_to_ros
+from push_ros.conversions import circles_from_ros, path_to_ros
 from push_ros.diagnostics import Diagnostics
+from push_ros.map_feed import MapFeed
 from push_ros.names import names_of
 from push_ros.parameters import declare_settings
 from push_ros.process import run_node
@@ -73,13 +74,7 @@ class OptimizerNode(Node):
         self._diagnostics = Diagnostics(self, names, self._state)
         self._publisher = self.create_publisher(PlanMessage, names.team("group_plan"), LATCHED)
         self._path_publisher = self.create_publisher(Path, names.team("push_path"), LATCHED)
-        self.create_subscription(
-            OccupancyGrid,
-            names.world("map"),
-            self._on_map,
-            LATCHED,
-            event_callbacks=self._diagnostics.subscription_events(names.world("map")),
-        )
+        MapFeed(self, names, self._diagnostics, self._take_map)
         self._server = GoalServer(
             self,
             PlanGroupPush,
@@ -99,14 +94,8 @@ class OptimizerNode(Node):
         self.settings = settings
         self._planner = None
 
-    def _on_map(self, message: OccupancyGrid) -> None:
-        try:
-            grid = grid_from_ros(message)
-        except InvalidMessage as error:
-            self._diagnostics.refuse("/map", str(error))
-            return
-        if self._grid is None or not self._grid.equals(grid):
-            self._grid, self._planner = grid, None
+    def _take_map(self, grid: Grid) -> None:
+        self._grid, self._planner = grid, None
 
     def _preempt(self) -> None:
         if self._server.active:

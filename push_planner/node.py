@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from nav_msgs.msg import OccupancyGrid, Path
+from nav_msgs.msg import Path
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
@@ -35,12 +35,12 @@ from push_planner import (
 from push_ros.actions import GoalServer
 from push_ros.conversions import (
     circles_from_ros,
-    grid_from_ros,
     path_to_ros,
     plan_to_ros,
     trajectory_to_ros,
 )
 from push_ros.diagnostics import Diagnostics
+from push_ros.map_feed import MapFeed
 from push_ros.names import names_of
 from push_ros.parameters import declare_settings
 from push_ros.process import run_node
@@ -87,13 +87,7 @@ class PlannerNode(Node):
         self._diagnostics = Diagnostics(self, names, self._state)
         self._plan_publisher = self.create_publisher(PlanMessage, names.team("push_plan"), LATCHED)
         self._path_publisher = self.create_publisher(Path, names.team("push_path"), LATCHED)
-        self.create_subscription(
-            OccupancyGrid,
-            names.world("map"),
-            self._on_map,
-            LATCHED,
-            event_callbacks=self._diagnostics.subscription_events(names.world("map")),
-        )
+        MapFeed(self, names, self._diagnostics, self._take_map)
         self._server = GoalServer(
             self,
             PlanPush,
@@ -123,15 +117,8 @@ class PlannerNode(Node):
         self.settings = settings
         self._planners.clear()
 
-    def _on_map(self, message: OccupancyGrid) -> None:
+    def _take_map(self, grid: Grid) -> None:
         """A plan under way on another map is dropped and begun anew."""
-        try:
-            grid = grid_from_ros(message)
-        except InvalidMessage as error:
-            self._diagnostics.refuse("/map", str(error))
-            return
-        if self._grid is not None and self._grid.equals(grid):
-            return
         self._grid, self._field = grid, None
         self._planners.clear()
         if self._pending or self._work is not None:

@@ -2,10 +2,11 @@
 
 import struct
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
@@ -79,6 +80,11 @@ class PoseFeed:
     def pose(self, name: str) -> Array | None:
         """The last accepted pose ``(3,)``; None when there is none or it is stale."""
         return self.gate.pose(name)
+
+    def discs(self, radii: Mapping[str, float]) -> Array:
+        """``(k, 3)`` x, y, radius [m] of bodies that are seen, of radii [m] by name."""
+        found = [[*p[:2], r] for name, r in radii.items() if (p := self.pose(name)) is not None]
+        return np.array(found).reshape(-1, 3)
 
     def _on_paused(self, message: Bool) -> None:
         self.paused = bool(message.data)

@@ -7,7 +7,6 @@ from abc import ABC, abstractmethod
 from typing import Any
 
 import numpy as np
-from nav_msgs.msg import OccupancyGrid
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from std_msgs.msg import Header
@@ -16,13 +15,11 @@ from push_estimation.pose_gate import PoseGateSettings, Stamp
 from push_model.arrays import Array
 from push_model.jobs import JobError, JobPhase
 from push_model.occupancy import OccupancyGrid as Grid
-from push_ros.conversions import grid_from_ros
 from push_ros.diagnostics import Diagnostics
 from push_ros.job_intake import JobIntake
+from push_ros.map_feed import MapFeed
 from push_ros.names import names_of
 from push_ros.pose_feed import Frame, PoseFeed
-from push_ros.qos import LATCHED
-from push_ros.validation import InvalidMessage
 from push_scenario.scenario import Scenario, load_scenario
 
 PATIENCE = 10.0  # [s] wall time for poses, and for other nodes
@@ -81,14 +78,7 @@ class TeamNode(Node, ABC):
         self._intake = JobIntake(
             self, names, self._diagnostics, self, self._kind, list(self.robots), self.object
         )
-        topic = names.world("map")
-        self.create_subscription(
-            OccupancyGrid,
-            topic,
-            self._on_map,
-            LATCHED,
-            event_callbacks=self._diagnostics.subscription_events(topic),
-        )
+        MapFeed(self, names, self._diagnostics, self._take_map)
         self._watchdog = self.create_timer(
             0.1, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
@@ -121,21 +111,6 @@ class TeamNode(Node, ABC):
         """See JobOwner; there is never a plan that waits."""
 
     # The world
-
-    def others(self) -> Array:
-        """``(k, 3)`` x, y, radius [m] of bodies that are seen and not the team's."""
-        bodies = {name: self._poses.pose(name) for name in self._others}
-        found = [[*p[:2], self._others[n]] for n, p in bodies.items() if p is not None]
-        return np.array(found).reshape(-1, 3)
-
-    def _on_map(self, message: OccupancyGrid) -> None:
-        try:
-            grid = grid_from_ros(message)
-        except InvalidMessage as error:
-            self._diagnostics.refuse("/map", str(error))
-            return
-        if self._grid is None or not self._grid.equals(grid):
-            self._take_map(grid)
 
     def _on_frame(self, frame: Frame) -> None:
         self._stamp = frame.stamp

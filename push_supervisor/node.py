@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import yaml
-from nav_msgs.msg import OccupancyGrid
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from std_msgs.msg import Header, String
@@ -15,17 +14,18 @@ from push_estimation.pose_gate import PoseGateSettings, Stamp
 from push_model import se2
 from push_model.arrays import Array
 from push_model.jobs import GoalRefused, JobError
+from push_model.occupancy import OccupancyGrid as Grid
 from push_model.settings import SettingsError
 from push_msgs.action import MoveObject
-from push_ros.conversions import grid_from_ros
 from push_ros.diagnostics import Diagnostics
 from push_ros.job_intake import JobIntake
+from push_ros.map_feed import MapFeed
 from push_ros.names import names_of
 from push_ros.parameters import declare_settings
 from push_ros.pose_feed import Frame, PoseFeed
 from push_ros.process import run_node
 from push_ros.qos import LATCHED, STREAM
-from push_ros.validation import FRAME, InvalidMessage
+from push_ros.validation import FRAME
 from push_scenario.scenario import Scenario, load_scenario
 from push_supervisor import motions
 from push_supervisor.errands import Errand, Errands, Moment, Peer, Step
@@ -92,13 +92,7 @@ class SupervisorNode(Node):
         names = self.names
         heartbeat = names.robot(self.robot, "heartbeat")
         self._heartbeat_publisher = self.create_publisher(Header, heartbeat, STREAM)
-        self.create_subscription(
-            OccupancyGrid,
-            names.world("map"),
-            self._on_map,
-            LATCHED,
-            event_callbacks=self._diagnostics.subscription_events(names.world("map")),
-        )
+        MapFeed(self, names, self._diagnostics, self._take_map)
         self.create_subscription(String, names.world("scenario"), self._on_scenario, LATCHED)
         self._watchdog = self.create_timer(
             0.1, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME)
@@ -150,12 +144,7 @@ class SupervisorNode(Node):
 
     # The world
 
-    def _on_map(self, message: OccupancyGrid) -> None:
-        try:
-            grid = grid_from_ros(message)
-        except InvalidMessage as error:
-            self._diagnostics.refuse("/map", str(error))
-            return
+    def _take_map(self, grid: Grid) -> None:
         if not self.surroundings.take_map(grid):
             return
         self._fire(Event.NEW_MAP, problem=self.surroundings.blocked(self.machine.remaining))

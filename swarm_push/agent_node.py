@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import TwistStamped
-from nav_msgs.msg import OccupancyGrid
 from rclpy.node import Node
 from std_msgs.msg import Header
 
@@ -19,12 +18,13 @@ from push_model import se2
 from push_model.arrays import Array
 from push_model.occupancy import OccupancyGrid as Grid
 from push_msgs.msg import SwarmTarget, SwarmWord
-from push_ros.conversions import grid_from_ros, time_from_ros
+from push_ros.conversions import time_from_ros
 from push_ros.diagnostics import Diagnostics
+from push_ros.map_feed import MapFeed
 from push_ros.names import names_of
 from push_ros.pose_feed import Frame, PoseFeed
 from push_ros.process import run_node
-from push_ros.qos import CHATTER, COMMAND, LATCHED
+from push_ros.qos import CHATTER, COMMAND
 from push_ros.validation import InvalidMessage
 from push_scenario.scenario import Scenario, load_scenario
 from swarm_push.agent import Agent, Word
@@ -60,7 +60,6 @@ class SwarmAgentNode(Node):
         }
         self.agent: Agent | None = None
         self._why_not = "there is no map yet"
-        self._grid: Grid | None = None
         self._target: Array | None = None
         self._told = -np.inf  # [s] stamp of the last target
         self._words: list[Word] = []
@@ -73,10 +72,10 @@ class SwarmAgentNode(Node):
         for kind, topic, handler, qos in (
             (SwarmWord, names.team("swarm_words"), self._on_word, CHATTER),
             (SwarmTarget, names.team("swarm_target"), self._on_target, COMMAND),
-            (OccupancyGrid, names.world("map"), self._on_map, LATCHED),
         ):
             events = self._diagnostics.subscription_events(topic)
             self.create_subscription(kind, topic, handler, qos, event_callbacks=events)
+        MapFeed(self, names, self._diagnostics, self._take_map)
         self._poses = PoseFeed(
             self,
             names,
@@ -88,15 +87,8 @@ class SwarmAgentNode(Node):
 
     # What comes
 
-    def _on_map(self, message: OccupancyGrid) -> None:
-        try:
-            grid = grid_from_ros(message)
-        except InvalidMessage as error:
-            self._diagnostics.refuse("/map", str(error))
-            return
-        if self._grid is not None and self._grid.equals(grid):
-            return
-        self._grid, self.agent = grid, None
+    def _take_map(self, grid: Grid) -> None:
+        self.agent = None
         job = self.settings.make_job(grid, self._item, self._spec)
         if isinstance(job, str):
             self._why_not = job
@@ -152,11 +144,8 @@ class SwarmAgentNode(Node):
         for word in heard:
             agent.hear(word)
         agent.pursue(self._target if now - self._told < self.settings.agents.silence else None)
-        bodies = {n: self._poses.pose(n) for n in self._others}
-        others = [[*p[:2], self._others[n]] for n, p in bodies.items() if p is not None]
-        twist, word = agent.step(
-            now, self._item.mass_pose(item), own, np.array(others).reshape(-1, 3)
-        )
+        others = self._poses.discs(self._others)
+        twist, word = agent.step(now, self._item.mass_pose(item), own, others)
         self._said.publish(word_to_ros(stamp, word))
         return twist
 

@@ -161,7 +161,7 @@ class SwarmNode(TeamNode):
         self._waiting = time.monotonic()
         self._pose = self._item.mass_pose(item)
         seen = {n: p for n in self.robots if (p := self._poses.pose(n)) is not None}
-        others, began = self.others(), time.thread_time()
+        others, began = self._poses.discs(self._others), time.thread_time()
         twists = self.job.step(self._poses.stamp, self._pose, seen, others)
         if self.job.last is not None:
             cost, names = time.thread_time() - began, self.job.taking_part

@@ -1,0 +1,44 @@
+"""The map of the world as a node uses it: validated, and told when it is another one."""
+
+from collections.abc import Callable
+
+from nav_msgs.msg import OccupancyGrid
+from rclpy.node import Node
+
+from push_model.occupancy import OccupancyGrid as Grid
+from push_ros.conversions import grid_from_ros
+from push_ros.diagnostics import Diagnostics
+from push_ros.names import Names
+from push_ros.qos import LATCHED
+from push_ros.validation import InvalidMessage
+
+
+class MapFeed:
+    """Subscribes to ``map``; calls ``taken`` with each map that differs from the one before."""
+
+    def __init__(
+        self,
+        node: Node,
+        names: Names,
+        diagnostics: Diagnostics,
+        taken: Callable[[Grid], None],
+    ) -> None:
+        self._topic, self._diagnostics, self._taken = names.world("map"), diagnostics, taken
+        self._last: Grid | None = None
+        node.create_subscription(
+            OccupancyGrid,
+            self._topic,
+            self._on_data,
+            LATCHED,
+            event_callbacks=diagnostics.subscription_events(self._topic),
+        )
+
+    def _on_data(self, message: OccupancyGrid) -> None:
+        try:
+            grid = grid_from_ros(message)
+        except InvalidMessage as error:
+            self._diagnostics.refuse(self._topic, str(error))
+            return
+        if self._last is None or not self._last.equals(grid):
+            self._last = grid
+            self._taken(grid)
