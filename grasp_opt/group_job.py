@@ -15,7 +15,7 @@ from grasp_opt.group_push import GroupPush, GroupPushSettings, GroupStep, Phase
 from grasp_opt.moves import Mover, MoveSettings, back_off
 from grasp_opt.object_trajectory import ObjectTrajectory
 from grasp_opt.step_planner import GroupPlan
-from push_estimation.obedience import Obedience
+from push_estimation.actuation_monitor import ActuationMonitor
 from push_model import se2
 from push_model.arrays import Array
 from push_model.jobs import JobError, JobPhase
@@ -84,7 +84,7 @@ class GroupJob:
         self._fewest = 0  # robots that are to push at least: fewer have failed
         self._push: GroupPush | None = None
         self._mover: Mover | None = None
-        self._watch: Obedience | None = None
+        self._watch: ActuationMonitor | None = None
         self._since = 0.0
 
     @property
@@ -152,7 +152,9 @@ class GroupJob:
 
     def _enter(self, state: JobPhase, reason: str) -> None:
         self.state, self.reason = state, reason
-        self._watch = Obedience(self._count, self._push_settings.dead, self._push_settings.dead_way)
+        self._watch = ActuationMonitor(
+            self._count, self._push_settings.dead, self._push_settings.dead_way
+        )
         if state is not JobPhase.POSITIONING:
             self._mover = None
         if state not in (JobPhase.APPROACH, JobPhase.PUSHING):

@@ -7,9 +7,9 @@ import numpy as np
 
 from grasp_opt.contact_outline import Contacts
 from grasp_opt.group_push import GroupStep
-from grasp_opt.marshal import Move
 from grasp_opt.object_trajectory import ObjectTrajectory, sampled
 from grasp_opt.placement import Placement
+from grasp_opt.sequencing import Move
 from grasp_opt.step_planner import GroupPlan
 from push_model import se2
 from push_model.arrays import Array

@@ -18,7 +18,7 @@ from grasp_opt.group_control import (
     GroupControlSettings,
 )
 from grasp_opt.object_trajectory import ObjectTrajectory
-from push_estimation.obedience import Obedience
+from push_estimation.actuation_monitor import ActuationMonitor
 from push_estimation.velocity_filter import VelocityFilter
 from push_model import se2
 from push_model.arrays import Array
@@ -101,7 +101,7 @@ class GroupPush:
         self._filter = VelocityFilter(
             s.position_noise, s.orientation_noise, s.acceleration, s.turning
         )
-        self._obedience = Obedience(len(ways), s.dead, s.dead_way)
+        self._obedience = ActuationMonitor(len(ways), s.dead, s.dead_way)
         self._begin: float | None = None
         self._last = 0.0
         self._contact_since: float | None = None

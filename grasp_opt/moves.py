@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grasp_opt.marshal import Move
+from grasp_opt.sequencing import Move
 from push_model import se2
 from push_model.arrays import Array
 from push_model.kinematics import DifferentialDrive

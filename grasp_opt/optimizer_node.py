@@ -13,8 +13,8 @@ from nav_msgs.msg import Path
 from rclpy.node import Node
 
 from grasp_opt.group_messages import plan_to_ros, trajectory_from_ros
-from grasp_opt.marshal import NoStep
 from grasp_opt.placement import PlacementSettings
+from grasp_opt.sequencing import NoStep
 from grasp_opt.step_planner import GroupPlan, StepPlanner, StepSettings, TooFew
 from push_model.occupancy import OccupancyGrid as Grid
 from push_model.settings import SettingsError

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_opt.contact_outline import ContactOutline
-from grasp_opt.marshal import LEAST_BACK, Marshal, Move, NoStep, standoffs
 from grasp_opt.object_trajectory import ObjectTrajectory, screw
 from grasp_opt.placement import (
     NoPlacement,
@@ -18,6 +17,7 @@ from grasp_opt.placement import (
     Placer,
     robust_placement,
 )
+from grasp_opt.sequencing import LEAST_BACK, Move, NoStep, Sequencer, standoffs
 from push_model import se2
 from push_model.arrays import Array, Mask
 from push_model.free_space import FreeSpace, Obstacles
@@ -375,12 +375,12 @@ class StepPlanner:
         places = np.column_stack([met, headings])
         outline = se2.transform(pose, self._shape)
         walls = Obstacles((outline,), still)
-        marshal = Marshal(self._space, self._radius, s.clearance, s.back, walls, robots, alive)
-        pushers = marshal.assign(places)
+        sequencer = Sequencer(self._space, self._radius, s.clearance, s.back, walls, robots, alive)
+        pushers = sequencer.assign(places)
         swept = np.vstack([se2.transform(p, centres) for p in poses])
-        marshal.clear(pushers, [se2.transform(p, self._shape) for p in poses], swept)
-        marshal.send(pushers, places)
-        return GroupPlan(pushers, placement, trajectory, marshal.batches(), left)
+        sequencer.clear(pushers, [se2.transform(p, self._shape) for p in poses], swept)
+        sequencer.send(pushers, places)
+        return GroupPlan(pushers, placement, trajectory, sequencer.batches(), left)
 
 
 def _turned(trajectory: ObjectTrajectory) -> float:

@@ -6,8 +6,8 @@ from pathlib import Path
 from benchmarks import NAMES
 
 
-def add_words(parser: argparse.ArgumentParser) -> None:
-    """The words of this verb."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of this verb."""
     parser.add_argument("what", nargs="?", default="all", choices=["all", *NAMES])
     parser.add_argument("--out", default="", help="folder for the JSON")
 

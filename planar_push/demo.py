@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from planar_push.words import (
+from planar_push.arguments import (
     add_factor,
     add_namespace,
     add_system_and_scenario,
@@ -22,8 +22,8 @@ from push_bringup.failures import SuiteFailed
 _POSITION, _ORIENTATION = 0.02, 0.1  # [m], [rad] of a demonstration that succeeds
 
 
-def add_words(parser: argparse.ArgumentParser) -> None:
-    """The words of this verb."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of this verb."""
     add_system_and_scenario(parser)
     parser.add_argument("--out", default="results/demo", help="folder; replaces an earlier demo")
     add_factor(parser)

@@ -4,11 +4,11 @@ import argparse
 import time
 from pathlib import Path
 
-from planar_push.words import whole
+from planar_push.arguments import whole
 
 
-def add_words(parser: argparse.ArgumentParser) -> None:
-    """The words of this verb."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of this verb."""
     parser.add_argument("name", help="e.g. single-robot")
     parser.add_argument("--scenarios", default="", help="comma-separated; the experiment's own")
     parser.add_argument("--trials", type=whole(1), default=5, help="of each scenario")

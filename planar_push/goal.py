@@ -3,15 +3,15 @@
 import argparse
 import sys
 
-from planar_push.words import add_namespace, add_timeout, finite, tell
+from planar_push.arguments import add_namespace, add_timeout, finite, tell
 from push_bringup.systems import check_namespace
 from push_model.jobs import JobError
 
 _PATIENCE = 10.0  # [s] wall time for the suite to be found
 
 
-def add_words(parser: argparse.ArgumentParser) -> None:
-    """The words of this verb."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of this verb."""
     parser.add_argument("x", type=finite, help="[m]")
     parser.add_argument("y", type=finite, help="[m]")
     parser.add_argument("theta", type=finite, help="[rad]")

@@ -5,7 +5,7 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from planar_push.words import (
+from planar_push.arguments import (
     add_factor,
     add_namespace,
     add_system_and_scenario,
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from push_bringup.preparation import SuiteSetup
 
 
-def add_words(parser: argparse.ArgumentParser) -> None:
-    """The words of this verb."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of this verb."""
     add_system_and_scenario(parser)
     parser.add_argument("--record", default="", help="bag folder")
     parser.add_argument("--respawn", action="store_true", help="start a node that died again")

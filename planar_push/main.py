@@ -1,4 +1,4 @@
-"""The command line: ``planar-push``. Each verb is a file of this package, with its words and what
+"""The command line: ``planar-push``. Each verb is a file of this package, with its options and what
 it does; this one is the grammar."""
 
 import argparse
@@ -9,16 +9,16 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from planar_push.words import hear_signals
+from planar_push.arguments import hear_signals
 from push_bringup.failures import DomainInUse, SuiteFailed
 from push_model.settings import SettingsError
 from push_ros.process import prepare_environment
 
-NOT_VERBS = ("main", "words", "__main__")
+NOT_VERBS = ("main", "arguments", "__main__")
 
 
 def verbs() -> list[str]:
-    """Names of the modules that are verbs: each has ``add_words`` and ``run``."""
+    """Names of the modules that are verbs: each has ``add_arguments`` and ``run``."""
     found = (m.name for m in pkgutil.iter_modules([str(Path(__file__).parent)]))
     return sorted(name for name in found if name not in NOT_VERBS)
 
@@ -35,7 +35,7 @@ def parser() -> argparse.ArgumentParser:
         text = text[:1].lower() + text[1:]
         command = commands.add_parser(name.replace("_", "-"), help=text, description=verb.__doc__)
         command.set_defaults(run=verb.run)
-        verb.add_words(command)
+        verb.add_arguments(command)
     return top
 
 

@@ -5,12 +5,12 @@ import importlib
 import json
 import sys
 
-from planar_push.words import add_scenario
+from planar_push.arguments import add_scenario
 from push_bringup.systems import MODULES
 
 
-def add_words(parser: argparse.ArgumentParser) -> None:
-    """The words of this verb."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of this verb."""
     parser.add_argument("name", choices=list(MODULES))
     add_scenario(parser)
     parser.add_argument("--ros", nargs=argparse.REMAINDER, default=[], help="ROS arguments, last")

@@ -5,12 +5,12 @@ import signal
 import sys
 from pathlib import Path
 
-from planar_push.words import add_namespace, positive
+from planar_push.arguments import add_namespace, positive
 from push_bringup.systems import check_namespace
 
 
-def add_words(parser: argparse.ArgumentParser) -> None:
-    """The words of this verb."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of this verb."""
     parser.add_argument("bag")
     parser.add_argument("--factor", type=positive, default=1.0, help="bag time over wall time")
     add_namespace(parser)
@@ -21,7 +21,7 @@ def run(arguments: argparse.Namespace) -> int:
     import rclpy
     from rclpy.signals import SignalHandlerOptions
 
-    from planar_push.words import stop_on_signals
+    from planar_push.arguments import stop_on_signals
     from push_bringup.preparation import check_domain
     from push_record.contents import bag_scenario
     from push_record.player import PlayerNode

@@ -3,12 +3,12 @@
 import argparse
 from pathlib import Path
 
-from planar_push.words import add_namespace, add_scenario
+from planar_push.arguments import add_namespace, add_scenario
 from push_bringup.systems import check_namespace
 
 
-def add_words(parser: argparse.ArgumentParser) -> None:
-    """The words of this verb."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of this verb."""
     add_scenario(parser, None)
     parser.add_argument("--out", required=True, help="bag folder")
     add_namespace(parser)

@@ -5,8 +5,8 @@ import sys
 from pathlib import Path
 
 
-def add_words(parser: argparse.ArgumentParser) -> None:
-    """The words of this verb."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of this verb."""
     parser.add_argument("bag")
     parser.add_argument("--out", default="", help="folder; <bag>-report when it is not given")
 

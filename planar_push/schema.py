@@ -4,8 +4,8 @@ import argparse
 from pathlib import Path
 
 
-def add_words(parser: argparse.ArgumentParser) -> None:
-    """The words of this verb."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of this verb."""
     parser.add_argument("--out", default="", help="folder; config/schema when it is not given")
 
 

@@ -3,12 +3,12 @@
 import argparse
 import sys
 
-from planar_push.words import add_namespace, add_scenario, whole
+from planar_push.arguments import add_namespace, add_scenario, whole
 from push_bringup.systems import check_namespace
 
 
-def add_words(parser: argparse.ArgumentParser) -> None:
-    """The words of this verb."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of this verb."""
     add_scenario(parser, None)
     add_namespace(parser)
     parser.add_argument("--host", default="127.0.0.1", help="address to serve on")

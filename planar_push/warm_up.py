@@ -3,7 +3,7 @@
 import argparse
 
 
-def add_words(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """It has none."""
 
 

@@ -18,7 +18,7 @@ from push_study.group_world import GroupWorld
 from push_study.pool import Row
 from push_study.swarm_run import ROBOT, TRACE, drive
 from push_study.uncertainty import uncertainty
-from swarm_push.agent import Agent, AgentSettings, Word
+from swarm_push.agent import Agent, AgentSettings, AgentState
 from swarm_push.region import covered_region
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
 
@@ -133,7 +133,7 @@ def drive_agents(
     agents = [Agent(n, job, settings) for n, job in zip(world.names, jobs, strict=True)]
     for agent in agents:
         agent.job.begin([goal])
-    ways, words, none, tick = [], list[Word](), np.zeros((0, 3)), 0
+    ways, words, none, tick = [], list[AgentState](), np.zeros((0, 3)), 0
     while world.time < task.limit and any(a.job.busy for a in agents):
         seen, robots = world.see()
         pose = item.mass_pose(seen)

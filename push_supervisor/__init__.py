@@ -1,20 +1,20 @@
 """Supervision of a manipulation (section 2.5): a pure state machine, and its node."""
 
 from push_model.jobs import JobError
-from push_supervisor.errands import Errand, Errands, Moment, Peer, Step
 from push_supervisor.machine import Command, Event, Machine, State
+from push_supervisor.requests import Moment, Peer, Request, Requests, Step
 from push_supervisor.settings import SupervisorSettings
 from push_supervisor.surroundings import Surroundings
 
 __all__ = [
     "Command",
-    "Errand",
-    "Errands",
     "Event",
     "JobError",
     "Machine",
     "Moment",
     "Peer",
+    "Request",
+    "Requests",
     "State",
     "Step",
     "SupervisorSettings",

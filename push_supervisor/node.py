@@ -28,9 +28,9 @@ from push_ros.qos import LATCHED, STREAM
 from push_ros.validation import FRAME
 from push_scenario.scenario import Scenario, load_scenario
 from push_supervisor import motions
-from push_supervisor.errands import Errand, Errands, Moment, Peer, Step
 from push_supervisor.machine import Command, Event, Machine, State
 from push_supervisor.peers import Peers
+from push_supervisor.requests import Moment, Peer, Request, Requests, Step
 from push_supervisor.settings import SupervisorSettings
 from push_supervisor.surroundings import Surroundings
 
@@ -67,7 +67,7 @@ class SupervisorNode(Node):
         others = {k: r for k, r in bodies.items() if k not in (self.robot, self.object)}
         self.surroundings = Surroundings(robot_spec, item_spec, others, self.settings)
         self.machine = Machine(self.settings, self._at_goal, self._touching)
-        self._errands = Errands(self.settings)
+        self._requests = Requests(self.settings)
         self._wall = 0.0  # [s] that stands still while the world is paused
         self._looked = time.monotonic()
         self._ticks = 0
@@ -106,7 +106,7 @@ class SupervisorNode(Node):
     def _apply(self, settings: SupervisorSettings) -> None:
         if self.machine.busy:
             raise SettingsError("the supervisor is busy; change its parameters when it is idle")
-        self.settings = self.machine.settings = self._errands.settings = settings
+        self.settings = self.machine.settings = self._requests.settings = settings
         self.surroundings.change_settings(settings)
 
     # The owner of the job, see JobOwner
@@ -215,7 +215,7 @@ class SupervisorNode(Node):
             return False
         return self.surroundings.touching(robot, item)
 
-    # The machine and its errands
+    # The machine and its requests
 
     def _fire(self, event: Event, **payload: Any) -> None:
         """Give an event to the machine and carry out its commands, one event after the other."""
@@ -238,13 +238,13 @@ class SupervisorNode(Node):
 
     def _carry_out(self, command: Command, arguments: dict[str, Any]) -> None:
         if command in (Command.STOP, Command.CANCEL_PLAN, Command.FINISH):
-            self._errands.drop()
+            self._requests.drop()
             self._peers.let_go()
             if command is Command.FINISH:
                 self._finish(arguments["code"], arguments["message"])
             return
         delay = self.settings.wait if arguments.get("later") else 0.0
-        self._errands.begin(Errand(command, arguments, delay), self._now())
+        self._requests.begin(Request(command, arguments, delay), self._now())
         self._tend()
 
     def _advance(self) -> None:
@@ -261,13 +261,13 @@ class SupervisorNode(Node):
         return Moment(self._wall, self._poses.stamp, known, self._peers.ready)
 
     def _tend(self) -> None:
-        """See to the errand under way."""
-        verdict = self._errands.tend(self._now())
-        errand = self._errands.errand
-        if verdict.step is Step.ASK and errand is not None:
-            if self._errands.asks > 1:
-                self.get_logger().warning(f"{errand.peer.value} does not answer; asking again")
-            self._ask(self._errands.number, errand)
+        """See to the request under way."""
+        verdict = self._requests.tend(self._now())
+        request = self._requests.request
+        if verdict.step is Step.ASK and request is not None:
+            if self._requests.asks > 1:
+                self.get_logger().warning(f"{request.peer.value} does not answer; asking again")
+            self._ask(self._requests.number, request)
         elif verdict.step is Step.LOST:
             self._peers.let_go()
             self._fire(Event.MOTION_FAILED, message=verdict.message, lost=True)
@@ -275,35 +275,35 @@ class SupervisorNode(Node):
             self._fire(Event.ABORT, code=verdict.code, message=verdict.message)
 
     def _on_sign(self, number: int) -> None:
-        self._errands.sign(number, self._now())
+        self._requests.sign(number, self._now())
 
     def _on_answer(self, number: int, event: Event, payload: dict[str, Any]) -> None:
-        if self._errands.answer(number):
+        if self._requests.answer(number):
             self._fire(event, **payload)
 
-    def _ask(self, number: int, errand: Errand) -> None:
-        """Send what an errand asks for; the poses are known."""
+    def _ask(self, number: int, request: Request) -> None:
+        """Send what a request asks for; the poses are known."""
         robot, item = self._pose(self.robot), self._pose(self.object)
         assert robot is not None and item is not None
-        near, peers, arguments = self.surroundings, self._peers, errand.arguments
+        near, peers, arguments = self.surroundings, self._peers, request.arguments
         bodies = {name: self._pose(name) for name in near.others}
         heartbeat = self.settings.heartbeat_timeout
-        if errand.command is Command.PLAN:
+        if request.command is Command.PLAN:
             goal, stamp = arguments["goal"], self._poses.stamp
             first = arguments["preemptive"]
             peers.plan(number, item, goal, stamp, first, near.bodies(bodies))
-        elif errand.command is Command.PATH:
+        elif request.command is Command.PATH:
             wait = motions.standoff(arguments["segment"], item)
             circles = near.on_the_way(item, bodies)
             peers.path(number, robot, wait, circles, crowded=len(circles) > 1)
-        elif errand.command is Command.FOLLOW_PUSH:
+        elif request.command is Command.FOLLOW_PUSH:
             segment = arguments["segment"]
             peers.push(number, segment, near.push(segment), heartbeat)
         else:
-            if errand.command is Command.FOLLOW_PATH:
+            if request.command is Command.FOLLOW_PATH:
                 way = arguments["trajectory"]
                 circles = near.follow(way, item)
-            elif errand.command is Command.FOLLOW_APPROACH:
+            elif request.command is Command.FOLLOW_APPROACH:
                 way, circles = near.approach(arguments["segment"], robot, item)
             else:
                 way, circles = near.retreat(robot, item)

@@ -25,8 +25,8 @@ from push_ros.conversions import (
 )
 from push_ros.names import Names
 from push_ros.validation import InvalidMessage
-from push_supervisor.errands import Peer
 from push_supervisor.machine import Event
+from push_supervisor.requests import Peer
 
 Answered = Callable[[int, Event, dict[str, Any]], None]
 """Called with the number of a question, and the event that its answer is."""

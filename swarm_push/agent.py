@@ -4,7 +4,7 @@ It knows where it is itself, where the object is, and what neighbours within a r
 messages may be lost. It runs the same job and law as a whole swarm's node does, about those that it
 knows of, and does what that says for itself. Where a law takes the mean of all robots, that comes
 by consensus: flow updating (Jesus, Baquero and Almeida 2009), which messages that are lost do not
-bias: neighbours keep count of what each has handed to the other, and every word has all of it.
+bias: neighbours keep count of what each has handed to the other, and every message has all of it.
 """
 
 from collections.abc import Mapping
@@ -31,7 +31,7 @@ class AgentSettings:
 
 
 @dataclass(frozen=True)
-class Word:
+class AgentState:
     """What a robot says at a time [s]: its pose ``(3,)``, what it takes for the mean ``(2,)`` [m]
     of all, and what ``(2,)`` [m] of it it has handed to each that it hears."""
 
@@ -50,7 +50,7 @@ class Agent:
         self.name, self.job, self.settings = name, job, settings
         self.target: Array | None = None
         self.mean: Array | None = None
-        self._heard: dict[str, Word] = {}
+        self._heard: dict[str, AgentState] = {}
         self._before: Array | None = None
         self._flows: dict[str, Array] = {}
         self._fresh: set[str] = set()  # heard since the last tick
@@ -71,21 +71,21 @@ class Agent:
         elif before is None or not np.array_equal(before, target, equal_nan=True):
             self.job.retarget(target)
 
-    def hear(self, word: Word) -> None:
+    def hear(self, message: AgentState) -> None:
         """Take what a robot says; from farther off than the radius nothing is heard."""
-        if word.name == self.name or self._random.random() < self.settings.lost:
+        if message.name == self.name or self._random.random() < self.settings.lost:
             return
         here = self._before
-        if here is None or np.hypot(*(word.pose - here)[:2]) > self.settings.radius:
-            self._heard.pop(word.name, None)
-            self._fresh.discard(word.name)
+        if here is None or np.hypot(*(message.pose - here)[:2]) > self.settings.radius:
+            self._heard.pop(message.name, None)
+            self._fresh.discard(message.name)
         else:
-            self._heard[word.name] = word
-            self._fresh.add(word.name)
+            self._heard[message.name] = message
+            self._fresh.add(message.name)
 
     def step(
         self, now: float, item: Array, pose: Array, others: Array
-    ) -> tuple[tuple[float, float], Word]:
+    ) -> tuple[tuple[float, float], AgentState]:
         """Twist v [m/s], omega [rad/s] and what it says. item ``(3,)`` of the object's centre of
         mass; pose ``(3,)`` of the robot; others ``(k, 3)`` x, y, radius [m] of what else stands."""
         late = now - self.settings.forget
@@ -94,7 +94,7 @@ class Agent:
         robots = {self.name: pose, **{n: w.pose for n, w in self._heard.items()}}
         twists = self.job.step(now, item, robots, others, self.mean)
         assert self.mean is not None
-        return twists[self.name], Word(self.name, now, pose, self.mean, dict(self._flows))
+        return twists[self.name], AgentState(self.name, now, pose, self.mean, dict(self._flows))
 
     def _agree(self, pose: Array) -> None:
         """On the mean: what a robot has of it is its own place less what it handed on, and all that

@@ -1,8 +1,9 @@
-"""The node of one robot of a swarm that decides for itself.
+"""The node of one robot of a decentralised swarm.
 
-It answers every frame of the pose stream with its robot's velocity and a word to those about it. Of
-the stream it takes its own pose, the object's, and those of bodies that are no robots of its swarm;
-the others' it has from their words, of which those from too far off and some more are lost.
+It answers every frame of the pose stream with its robot's velocity and broadcasts its state to its
+neighbours. From the stream it takes its own pose, the object's, and those of bodies outside its
+swarm. The other robots' poses come from their messages; messages from beyond the radius are ignored,
+and a set fraction of the rest is dropped.
 """
 
 import sys
@@ -17,7 +18,7 @@ from push_estimation.pose_gate import Stamp
 from push_model import se2
 from push_model.arrays import Array
 from push_model.occupancy import OccupancyGrid as Grid
-from push_msgs.msg import SwarmTarget, SwarmWord
+from push_msgs.msg import SwarmAgentState, SwarmTarget
 from push_ros.conversions import time_from_ros
 from push_ros.diagnostics import Diagnostics
 from push_ros.map_feed import MapFeed
@@ -27,9 +28,9 @@ from push_ros.process import run_node
 from push_ros.qos import CHATTER, COMMAND
 from push_ros.validation import InvalidMessage
 from push_scenario.scenario import Scenario, load_scenario
-from swarm_push.agent import Agent, Word
+from swarm_push.agent import Agent, AgentState
 from swarm_push.parameters import declare_swarm
-from swarm_push.swarm_messages import target_from_ros, word_from_ros, word_to_ros
+from swarm_push.swarm_messages import agent_state_from_ros, agent_state_to_ros, target_from_ros
 
 
 class SwarmAgentNode(Node):
@@ -62,15 +63,17 @@ class SwarmAgentNode(Node):
         self._why_not = "there is no map yet"
         self._target: Array | None = None
         self._told = -np.inf  # [s] stamp of the last target
-        self._words: list[Word] = []
+        self._messages: list[AgentState] = []
         self._diagnostics = Diagnostics(self, names, self._state)
         topic = names.robot(self.robot, "cmd_vel")
         self._commands = self.create_publisher(
             TwistStamped, topic, COMMAND, event_callbacks=self._diagnostics.publisher_events(topic)
         )
-        self._said = self.create_publisher(SwarmWord, names.team("swarm_words"), CHATTER)
+        self._said = self.create_publisher(
+            SwarmAgentState, names.team("swarm_agent_states"), CHATTER
+        )
         for kind, topic, handler, qos in (
-            (SwarmWord, names.team("swarm_words"), self._on_word, CHATTER),
+            (SwarmAgentState, names.team("swarm_agent_states"), self._on_neighbour, CHATTER),
             (SwarmTarget, names.team("swarm_target"), self._on_target, COMMAND),
         ):
             events = self._diagnostics.subscription_events(topic)
@@ -104,21 +107,21 @@ class SwarmAgentNode(Node):
             return
         self._told = time_from_ros(message.header.stamp)
 
-    def _on_word(self, message: SwarmWord) -> None:
+    def _on_neighbour(self, message: SwarmAgentState) -> None:
         try:
-            word = word_from_ros(message)
+            message = agent_state_from_ros(message)
         except InvalidMessage as error:
-            self._diagnostics.refuse("swarm_words", str(error))
+            self._diagnostics.refuse("swarm_agent_states", str(error))
             return
-        if word.name in self._team and word.name != self.robot:
-            self._words.append(word)
+        if message.name in self._team and message.name != self.robot:
+            self._messages.append(message)
 
     # What it does
 
     def _on_frame(self, frame: Frame) -> None:
         twist = (0.0, 0.0)
         if frame.verdict is Stamp.RESET:
-            self._target, self._words, self._told = None, [], -np.inf
+            self._target, self._messages, self._told = None, [], -np.inf
             if self.agent is not None:
                 self.agent.pursue(None)
         elif frame.verdict is not Stamp.REFUSED:
@@ -139,14 +142,14 @@ class SwarmAgentNode(Node):
         if agent is None or item is None or own is None:
             return 0.0, 0.0
         # Words of this very frame come before or after it, as it happens: they count at the next.
-        heard = sorted((w for w in self._words if w.time < now), key=lambda w: (w.time, w.name))
-        self._words = [w for w in self._words if w.time >= now]
-        for word in heard:
-            agent.hear(word)
+        heard = sorted((w for w in self._messages if w.time < now), key=lambda w: (w.time, w.name))
+        self._messages = [w for w in self._messages if w.time >= now]
+        for message in heard:
+            agent.hear(message)
         agent.pursue(self._target if now - self._told < self.settings.agents.silence else None)
         others = self._poses.discs(self._others)
-        twist, word = agent.step(now, self._item.mass_pose(item), own, others)
-        self._said.publish(word_to_ros(stamp, word))
+        twist, message = agent.step(now, self._item.mass_pose(item), own, others)
+        self._said.publish(agent_state_to_ros(stamp, message))
         return twist
 
     def _state(self) -> dict[str, Any]:

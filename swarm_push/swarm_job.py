@@ -21,8 +21,8 @@ from push_model.settings import bounded, settings
 from push_model.specs import ObjectSpec, RobotSpec
 from swarm_push.law import Scene, SwarmPhase, SwarmStep
 from swarm_push.laws import LawSections, make_law
+from swarm_push.liveness import LivenessCheck
 from swarm_push.object_track import ObjectTrack, TrackSettings
-from swarm_push.roll_call import RollCall
 from swarm_push.spacing import keep_apart
 from swarm_push.walls import Walls
 
@@ -97,7 +97,7 @@ class SwarmJob:
         self.last: SwarmStep | None = None
         self.taking_part: tuple[str, ...] = ()
         s, wheels = self.settings, not self.holonomic
-        self._roll = RollCall(s.dead, s.dead_way, s.jammed, s.again, wheels)
+        self._liveness = LivenessCheck(s.dead, s.dead_way, s.jammed, s.again, wheels)
         self._begun: float | None = None
         self._nearest = math.inf
         self._progress = self._seen = 0.0
@@ -123,7 +123,7 @@ class SwarmJob:
     @property
     def dead(self) -> frozenset[str]:
         """Robots that do not do as they are told."""
-        return frozenset(self._roll.dead)
+        return frozenset(self._liveness.dead)
 
     @property
     def target(self) -> Array | None:
@@ -161,7 +161,7 @@ class SwarmJob:
 
     def revive(self) -> None:
         """Believe in all robots again: a new job, a reset world, or somebody saw to them."""
-        self._roll.revive()
+        self._liveness.revive()
 
     def errors(self, pose: Array) -> tuple[float, float]:
         """[m], [rad] from the target that is pursued; no heading counts as none off."""
@@ -190,12 +190,12 @@ class SwarmJob:
             self._nearest = math.inf
         if self._reached(now, pose) or self._given_up(now, pose, robots):
             return dict.fromkeys(robots, (0.0, 0.0))
-        tried = self._roll.try_again(now, robots)
-        names = tuple(n for n in robots if n not in self._roll.dead)
+        tried = self._liveness.try_again(now, robots)
+        names = tuple(n for n in robots if n not in self._liveness.dead)
         if not names:
             return {n: tried.get(n, (0.0, 0.0)) for n in robots}
         self.taking_part, poses = names, np.array([robots[n] for n in names])
-        still = [[*robots[n][:2], self._radius] for n in robots if n in self._roll.dead]
+        still = [[*robots[n][:2], self._radius] for n in robots if n in self._liveness.dead]
         fixed = np.vstack([np.array(still).reshape(-1, 3), others])
         target = self._aim(now, pose, fixed)
         if target is None:
@@ -208,7 +208,7 @@ class SwarmJob:
         if self._drive is not None:
             twists = moved = self._drive.follow(velocities, poses[:, 2], self.settings.lead)
         touched = self._touched(pose, poses[:, :2], fixed)
-        tested = self._roll.step(now, names, poses, moved, touched)
+        tested = self._liveness.step(now, names, poses, moved, touched)
         twists = tested if self._drive is not None else twists
         told = {n: (float(v), float(w)) for n, (v, w) in zip(names, twists, strict=True)}
         told |= tried
@@ -283,7 +283,7 @@ class SwarmJob:
 
     def _given_up(self, now: float, pose: Array, robots: Mapping[str, Array]) -> bool:
         s = self.settings
-        alive = [n for n in robots if n not in self._roll.dead]
+        alive = [n for n in robots if n not in self._liveness.dead]
         if alive:
             self._seen = now
         elif now - self._seen > s.alone:

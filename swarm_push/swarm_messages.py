@@ -8,10 +8,10 @@ import numpy as np
 
 from push_model.arrays import Array
 from push_model.specs import ObjectSpec
-from push_msgs.msg import SwarmStatus, SwarmTarget, SwarmWord
+from push_msgs.msg import SwarmAgentState, SwarmStatus, SwarmTarget
 from push_ros.conversions import time_from_ros
 from push_ros.validation import FRAME, InvalidMessage, check_frame, finite
-from swarm_push.agent import Word
+from swarm_push.agent import AgentState
 from swarm_push.density import Density
 from swarm_push.swarm_job import SwarmJob
 
@@ -99,30 +99,30 @@ def target_from_ros(message: SwarmTarget) -> Array | None:
     return np.array([message.x, message.y, message.theta])
 
 
-def word_to_ros(stamp: Any, word: Word) -> SwarmWord:
-    """What a robot says."""
-    message = SwarmWord(robot=word.name, heard=list(word.flows))
+def agent_state_to_ros(stamp: Any, state: AgentState) -> SwarmAgentState:
+    """The state that an agent broadcasts."""
+    message = SwarmAgentState(robot=state.name, heard=list(state.flows))
     message.header.frame_id, message.header.stamp = FRAME, stamp
-    message.x, message.y, message.theta = (float(v) for v in word.pose)
-    message.mean_x, message.mean_y = (float(v) for v in word.mean)
-    message.flow_x = [float(f[0]) for f in word.flows.values()]
-    message.flow_y = [float(f[1]) for f in word.flows.values()]
+    message.x, message.y, message.theta = (float(v) for v in state.pose)
+    message.mean_x, message.mean_y = (float(v) for v in state.mean)
+    message.flow_x = [float(f[0]) for f in state.flows.values()]
+    message.flow_y = [float(f[1]) for f in state.flows.values()]
     return message
 
 
-def word_from_ros(message: SwarmWord) -> Word:
-    """What a robot says.
+def agent_state_from_ros(message: SwarmAgentState) -> AgentState:
+    """The state that an agent broadcast.
 
     Raises
     ------
     InvalidMessage
     """
-    check_frame(message.header.frame_id, "a robot's word")
+    check_frame(message.header.frame_id, "the state of an agent")
     pose, mean = (message.x, message.y, message.theta), (message.mean_x, message.mean_y)
     if not len(message.heard) == len(message.flow_x) == len(message.flow_y):
-        raise InvalidMessage("a robot's word has flows of another number than robots")
+        raise InvalidMessage("the state of an agent has flows of another number than robots")
     flows = np.column_stack([message.flow_x, message.flow_y]).reshape(-1, 2)
-    finite((*pose, *mean, *flows.ravel()), "a robot's word")
+    finite((*pose, *mean, *flows.ravel()), "the state of an agent")
     time = time_from_ros(message.header.stamp)
     handed = dict(zip(message.heard, flows, strict=True))
-    return Word(message.robot, time, np.array(pose), np.array(mean), handed)
+    return AgentState(message.robot, time, np.array(pose), np.array(mean), handed)

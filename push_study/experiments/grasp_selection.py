@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_opt.group_job import GroupJob
-from grasp_opt.marshal import NoStep
 from grasp_opt.object_trajectory import study_trajectories
 from grasp_opt.selection import GraspSelector, NoGraspFound, Selection
+from grasp_opt.sequencing import NoStep
 from grasp_opt.step_planner import GroupPlan, StepPlanner
 from push_model import se2
 from push_model.arrays import Array

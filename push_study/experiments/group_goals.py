@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_opt.group_job import GroupJob
-from grasp_opt.marshal import NoStep
+from grasp_opt.sequencing import NoStep
 from grasp_opt.step_planner import StepPlanner, StepSettings, TooFew
 from push_model import se2
 from push_model.arrays import Array

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from grasp_opt.contact_outline import ContactOutline
-from grasp_opt.group_push import GroupPush, GroupPushSettings, Obedience, Phase
+from grasp_opt.group_push import ActuationMonitor, GroupPush, GroupPushSettings, Phase
 from grasp_opt.object_trajectory import polynomial
 from push_model.specs import EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
@@ -72,7 +72,7 @@ def test_an_object_that_is_too_heavy_ends_the_push():
 
 def test_obedience_tells_who_stands_from_who_waits_and_who_goes():
     random = np.random.default_rng(1)
-    watch = Obedience(3, 1.0, 0.01)
+    watch = ActuationMonitor(3, 1.0, 0.01)
     told = np.array([[0.05, 0.0], [0.05, 0.0], [0.0, 0.0]])
     for k in range(120):
         t = k * TICK
@@ -87,7 +87,7 @@ def test_obedience_tells_who_stands_from_who_waits_and_who_goes():
 
 
 def test_obedience_tells_who_does_not_turn():
-    watch = Obedience(2, 1.0, 0.01)
+    watch = ActuationMonitor(2, 1.0, 0.01)
     told = np.array([[0.0, 0.8], [0.0, 0.8]])
     for k in range(80):
         t = k * TICK

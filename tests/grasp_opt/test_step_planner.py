@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from grasp_opt.marshal import Marshal, NoStep
 from grasp_opt.moves import Mover, MoveSettings, back_off
 from grasp_opt.object_trajectory import screw
+from grasp_opt.sequencing import NoStep, Sequencer
 from grasp_opt.step_planner import StepPlanner, StepSettings, TooFew
 from push_model import se2
 from push_model.free_space import FreeSpace, Obstacles
@@ -141,11 +141,11 @@ def test_who_stands_in_the_way_and_cannot_leave_is_not_run_over():
     space = FreeSpace(OccupancyGrid(occupied, 0.02, np.array([-2.0, -1.5])))
     outline = plate(6).geometry.outline
     for middle, passes in ((0.0, False), (0.27, True), (1.5, True)):
-        marshal = Marshal(space, RADIUS, 0.01, 0.05, Obstacles(), np.zeros((1, 3)), [0])
+        sequencer = Sequencer(space, RADIUS, 0.01, 0.05, Obstacles(), np.zeros((1, 3)), [0])
         moved = [outline + [0.0, middle]]
         if passes:
-            marshal.clear((), moved, np.array([[1.0, 1.0]]))
-            assert marshal.batches() == ()
+            sequencer.clear((), moved, np.array([[1.0, 1.0]]))
+            assert sequencer.batches() == ()
         else:
             with pytest.raises(NoStep, match="stands in the way and cannot leave"):
-                marshal.clear((), moved, np.array([[1.0, 1.0]]))
+                sequencer.clear((), moved, np.array([[1.0, 1.0]]))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import rclpy
 
-from planar_push import words
+from planar_push import arguments
 from planar_push.main import main, parser, verbs
 from push_bringup import launcher
 from push_msgs.msg import Poses
@@ -135,9 +135,13 @@ def test_schemas_are_written_as_they_are_in_config(tmp_path, capsys):
 
 
 def test_numbers_on_the_command_line():
-    assert words.positive("2.5") == 2.5 and words.whole(1)("3") == 3
-    for parse, text in ((words.positive, "0"), (words.finite, "nan"), (words.whole(1), "0")):
-        with pytest.raises(words.argparse.ArgumentTypeError):
+    assert arguments.positive("2.5") == 2.5 and arguments.whole(1)("3") == 3
+    for parse, text in (
+        (arguments.positive, "0"),
+        (arguments.finite, "nan"),
+        (arguments.whole(1), "0"),
+    ):
+        with pytest.raises(arguments.argparse.ArgumentTypeError):
             parse(text)
 
 

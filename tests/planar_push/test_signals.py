@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from planar_push import words
+from planar_push import arguments
 
 
 @pytest.fixture
@@ -16,25 +16,25 @@ def handlers():
     yield
     for number, handler in before.items():
         signal.signal(number, handler)
-    words._asked.clear()
+    arguments._asked.clear()
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_that_something_swallowed_stops_what_is_started_later(handlers, number):
-    words.hear_signals()
+    arguments.hear_signals()
     with pytest.raises(KeyboardInterrupt):
         os.kill(os.getpid(), number)
     stopped = []
-    words.stop_on_signals(lambda: stopped.append(True))
+    arguments.stop_on_signals(lambda: stopped.append(True))
     assert stopped == [True]
     os.kill(os.getpid(), number)
     assert stopped == [True, True]
 
 
 def test_without_a_signal_nothing_is_stopped(handlers):
-    words.hear_signals()
+    arguments.hear_signals()
     stopped = []
-    words.stop_on_signals(lambda: stopped.append(True))
+    arguments.stop_on_signals(lambda: stopped.append(True))
     assert not stopped
 
 

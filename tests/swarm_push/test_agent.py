@@ -5,18 +5,23 @@ import math
 import numpy as np
 import pytest
 
-from push_msgs.msg import SwarmTarget, SwarmWord
+from push_msgs.msg import SwarmAgentState, SwarmTarget
 from push_ros.validation import InvalidMessage
 from push_scenario.bodies import load_object, load_robot
 from push_study.swarm_map import MapTask, run
-from swarm_push.agent import Agent, AgentSettings, Word
+from swarm_push.agent import Agent, AgentSettings, AgentState
 from swarm_push.laws import LawSections, LawSettings
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
-from swarm_push.swarm_messages import target_from_ros, target_to_ros, word_from_ros, word_to_ros
+from swarm_push.swarm_messages import (
+    agent_state_from_ros,
+    agent_state_to_ros,
+    target_from_ros,
+    target_to_ros,
+)
 
 NONE = np.zeros((0, 3))
 REGION = 3.0 * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
-STAMP = SwarmWord().header.stamp
+STAMP = SwarmAgentState().header.stamp
 
 
 def agents(count, law="crescent", **changes):
@@ -61,14 +66,14 @@ def test_words_from_afar_are_not_heard_and_old_ones_are_forgotten():
     (agent,) = agents(1, radius=0.5, forget=0.1)
     agent.step(0.0, np.zeros(3), np.zeros(3), NONE)
     near, far = np.array([0.4, 0.0, 0.0]), np.array([0.6, 0.0, 0.0])
-    agent.hear(Word("a", 0.0, near, near[:2], {}))
-    agent.hear(Word("b", 0.0, far, far[:2], {}))
-    agent.hear(Word("e0", 0.0, near, near[:2], {}))  # itself
+    agent.hear(AgentState("a", 0.0, near, near[:2], {}))
+    agent.hear(AgentState("b", 0.0, far, far[:2], {}))
+    agent.hear(AgentState("e0", 0.0, near, near[:2], {}))  # itself
     agent.step(0.02, np.zeros(3), np.zeros(3), NONE)
     assert agent.neighbours == ("a",)
-    agent.hear(Word("a", 0.02, far, far[:2], {}))  # gone off
+    agent.hear(AgentState("a", 0.02, far, far[:2], {}))  # gone off
     assert agent.neighbours == ()
-    agent.hear(Word("a", 0.04, near, near[:2], {}))
+    agent.hear(AgentState("a", 0.04, near, near[:2], {}))
     agent.step(0.2, np.zeros(3), np.zeros(3), NONE)
     assert agent.neighbours == ()
 
@@ -78,7 +83,7 @@ def test_part_of_the_words_is_lost():
     agent.step(0.0, np.zeros(3), np.zeros(3), NONE)
     heard = 0
     for k in range(2000):
-        agent.hear(Word(f"r{k}", 0.0, np.zeros(3), np.zeros(2), {}))
+        agent.hear(AgentState(f"r{k}", 0.0, np.zeros(3), np.zeros(2), {}))
     agent.step(0.02, np.zeros(3), np.zeros(3), NONE)
     heard = len(agent.neighbours)
     assert 0.65 < heard / 2000 < 0.75
@@ -105,7 +110,7 @@ def test_the_printed_law_takes_the_mean_that_they_agree_on():
     agent.pursue(np.array([1.0, 0.0, math.nan]))
     agent.step(0.0, np.zeros(3), np.array([-1.5, 0.0, 0.0]), NONE)
     alone = agent.job.last.density.mean
-    far = Word("a", 0.0, np.array([-1.5, 0.5, 0.0]), np.array([0.0, 2.0]), {})
+    far = AgentState("a", 0.0, np.array([-1.5, 0.5, 0.0]), np.array([0.0, 2.0]), {})
     agent.hear(far)
     agent.step(0.02, np.zeros(3), np.array([-1.5, 0.0, 0.0]), NONE)
     assert agent.mean[1] > 0.5
@@ -113,10 +118,10 @@ def test_the_printed_law_takes_the_mean_that_they_agree_on():
 
 
 def test_words_and_targets_go_through_their_messages():
-    word = Word(
+    word = AgentState(
         "e3", 0.0, np.array([1.0, -2.0, 0.5]), np.array([0.1, 0.2]), {"e1": np.array([0.5, 1.0])}
     )
-    again = word_from_ros(word_to_ros(STAMP, word))
+    again = agent_state_from_ros(agent_state_to_ros(STAMP, word))
     assert again.name == "e3" and list(again.flows) == ["e1"]
     assert np.array_equal(again.flows["e1"], [0.5, 1.0])
     assert np.array_equal(again.pose, word.pose) and np.array_equal(again.mean, word.mean)
@@ -132,12 +137,12 @@ def test_words_and_targets_go_through_their_messages():
         with pytest.raises(InvalidMessage):
             target_from_ros(message)
     for field, value in (("x", math.inf), ("flow_x", []), ("flow_y", [math.nan])):
-        message = word_to_ros(STAMP, word)
+        message = agent_state_to_ros(STAMP, word)
         setattr(message, field, value)
         with pytest.raises(InvalidMessage):
-            word_from_ros(message)
+            agent_state_from_ros(message)
     with pytest.raises(InvalidMessage):
-        word_from_ros(SwarmWord(robot="e1"))
+        agent_state_from_ros(SwarmAgentState(robot="e1"))
 
 
 def test_they_bring_an_object_to_its_pose_with_messages_lost(tmp_path):

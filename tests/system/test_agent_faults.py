@@ -7,7 +7,7 @@ from geometry_msgs.msg import TwistStamped
 from std_msgs.msg import Header
 
 from push_model.jobs import JobError
-from push_msgs.msg import JobState, SwarmTarget, SwarmWord
+from push_msgs.msg import JobState, SwarmAgentState, SwarmTarget
 from push_ros.qos import CHATTER, COMMAND
 from tests.system.test_swarm import VALUES, decentralised, running
 
@@ -59,17 +59,17 @@ def test_words_and_targets_that_are_none_are_refused():
         told = commands(run)
         run.start()
         run.teams[""].send_goal(GOAL)
-        words = run.observer.create_publisher(SwarmWord, "/swarm_words", CHATTER)
+        words = run.observer.create_publisher(SwarmAgentState, "/swarm_agent_states", CHATTER)
         targets = run.observer.create_publisher(SwarmTarget, "/swarm_target", COMMAND)
         pushing(run)
         for value in (math.nan, math.inf, -1e12):
             header = Header(frame_id="map", stamp=run.supervisor._stamp)
-            words.publish(SwarmWord(header=header, robot="e1", x=value))
+            words.publish(SwarmAgentState(header=header, robot="e1", x=value))
             targets.publish(SwarmTarget(header=header, active=True, x=value))
             run.spin_until(lambda: False, 0.2)
         for agent in agents(run):
             refused = agent._diagnostics.refused
-            assert refused["swarm_words"] >= 2 and refused["swarm_target"] >= 2
+            assert refused["swarm_agent_states"] >= 2 and refused["swarm_target"] >= 2
             assert np.array_equal(agent.agent.target, GOAL)
         assert all(math.isfinite(speed) for _, speed in told) and told[-1][1] > 0.0
         run.supervisor.end_job(JobError.CANCELED, "enough")

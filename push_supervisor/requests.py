@@ -1,4 +1,4 @@
-"""Errands: what was asked of which node, how often, and what to make of silence. No ROS.
+"""Requests: what was asked of which node, how often, and what to make of silence. No ROS.
 
 The state machine commands; a node is asked as soon as it is there and the poses are known. One that
 dies in the middle of its work never answers. Its servers stay in the graph for seconds, and those
@@ -51,7 +51,7 @@ class Moment:
 
 
 @dataclass(frozen=True)
-class Errand:
+class Request:
     """What to ask: the command and what comes with it. delay: [s] of pose time to wait before."""
 
     command: Command
@@ -85,15 +85,15 @@ class Verdict:
 _WAIT, _ASK = Verdict(Step.WAIT), Verdict(Step.ASK)
 
 
-class Errands:
-    """One errand at a time; each asking has a number, by which answers are told from late ones.
+class Requests:
+    """One request at a time; each asking has a number, by which answers are told from late ones.
 
-    errand: the one under way, None when there is none. asks: how often it was asked.
+    request: the one under way, None when there is none. asks: how often it was asked.
     """
 
     def __init__(self, settings: SupervisorSettings) -> None:
         self.settings = settings
-        self.errand: Errand | None = None
+        self.request: Request | None = None
         self.number = 0
         self.asks = 0
         self._asked = False
@@ -101,26 +101,26 @@ class Errands:
         self._missing: float | None = None  # [s] wall time since when it could not be asked
         self._sign_wall = self._sign_stamp = 0.0
 
-    def begin(self, errand: Errand, now: Moment) -> None:
-        """Take an errand in the place of whatever is under way."""
+    def begin(self, request: Request, now: Moment) -> None:
+        """Take a request in the place of whatever is under way."""
         self.drop()
-        self.errand = errand
-        self._not_before = now.stamp + errand.delay
+        self.request = request
+        self._not_before = now.stamp + request.delay
 
     def drop(self) -> None:
         """Whatever is under way is not wanted any more; answers to it are late."""
-        self.errand = None
+        self.request = None
         self.number += 1
         self.asks = 0
         self._asked, self._missing = False, None
 
     def tend(self, now: Moment) -> Verdict:
-        """To be called often; says what to do. After ASK the errand counts as asked."""
-        if self.errand is None:
+        """To be called often; says what to do. After ASK the request counts as asked."""
+        if self.request is None:
             return _WAIT
         if self._asked:
-            return self._listen(self.errand, now)
-        if now.poses and now.ready(self.errand.peer):
+            return self._listen(self.request, now)
+        if now.poses and now.ready(self.request.peer):
             self._missing = None
             if now.stamp < self._not_before:
                 return _WAIT
@@ -129,7 +129,7 @@ class Errands:
             self._missing = now.wall
         if now.wall - self._missing <= self.settings.node_timeout:
             return _WAIT
-        peer = self.errand.peer
+        peer = self.request.peer
         self.drop()
         if now.poses:
             return Verdict(Step.GIVE_UP, JobError.NODE_LOST, f"{peer.value} is not there")
@@ -141,7 +141,7 @@ class Errands:
             self._sign_wall, self._sign_stamp = now.wall, now.stamp
 
     def answer(self, number: int) -> bool:
-        """Whether an answer is the one waited for, and not a late one; the errand is done then."""
+        """Whether an answer is the one waited for, and not a late one; the request is done then."""
         if number != self.number or not self._asked:
             return False
         self.drop()
@@ -154,20 +154,20 @@ class Errands:
         self._sign_wall, self._sign_stamp = now.wall, now.stamp
         return _ASK
 
-    def _listen(self, errand: Errand, now: Moment) -> Verdict:
+    def _listen(self, request: Request, now: Moment) -> Verdict:
         """Whether the silence has lasted too long."""
         silence = now.wall - self._sign_wall
-        if errand.peer is Peer.CONTROLLER:
+        if request.peer is Peer.CONTROLLER:
             silence = min(silence, now.stamp - self._sign_stamp)
             if silence <= self.settings.controller_timeout:
                 return _WAIT
             self.drop()
-            return Verdict(Step.LOST, JobError.NODE_LOST, f"{errand.peer.value} is gone")
+            return Verdict(Step.LOST, JobError.NODE_LOST, f"{request.peer.value} is gone")
         if silence <= self.settings.answer_timeout:
             return _WAIT
         if self.asks >= ASKS:
             self.drop()
-            text = f"{errand.peer.value} does not answer"
+            text = f"{request.peer.value} does not answer"
             return Verdict(Step.GIVE_UP, JobError.NODE_LOST, text)
         self.number += 1  # what comes now is late
         self._asked = False

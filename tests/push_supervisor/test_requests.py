@@ -9,13 +9,13 @@ from hypothesis import settings as budget
 from hypothesis import strategies as st
 
 from push_model.jobs import JobError
-from push_supervisor import Command, Errand, Errands, Moment, Peer, Step, SupervisorSettings
-from push_supervisor.errands import ASKS, PEERS
+from push_supervisor import Command, Moment, Peer, Request, Requests, Step, SupervisorSettings
+from push_supervisor.requests import ASKS, PEERS
 
 SETTINGS = SupervisorSettings(
     node_timeout=5.0, answer_timeout=2.0, controller_timeout=1.0, wait=3.0
 )
-PLAN, PUSH = Errand(Command.PLAN, {"goal": "g"}), Errand(Command.FOLLOW_PUSH)
+PLAN, PUSH = Request(Command.PLAN, {"goal": "g"}), Request(Command.FOLLOW_PUSH)
 ALL = frozenset(Peer)
 
 
@@ -23,10 +23,10 @@ def at(wall, stamp=None, poses=True, ready=ALL):
     return Moment(wall, wall if stamp is None else stamp, poses, ready.__contains__)
 
 
-def begun(errand, now=None):
-    errands = Errands(SETTINGS)
-    errands.begin(errand, now or at(0.0))
-    return errands
+def begun(request, now=None):
+    requests = Requests(SETTINGS)
+    requests.begin(request, now or at(0.0))
+    return requests
 
 
 def test_everything_that_is_asked_for_has_somebody_to_ask():
@@ -34,31 +34,31 @@ def test_everything_that_is_asked_for_has_somebody_to_ask():
 
 
 def test_asked_at_once_and_answered():
-    errands = begun(PLAN)
-    assert errands.tend(at(0.0)).step is Step.ASK and errands.errand is PLAN
-    assert errands.tend(at(1.0)).step is Step.WAIT
-    assert not errands.answer(errands.number - 1)
-    assert errands.answer(errands.number) and errands.errand is None
-    assert not errands.answer(errands.number)  # once
-    assert errands.tend(at(100.0)).step is Step.WAIT
+    requests = begun(PLAN)
+    assert requests.tend(at(0.0)).step is Step.ASK and requests.request is PLAN
+    assert requests.tend(at(1.0)).step is Step.WAIT
+    assert not requests.answer(requests.number - 1)
+    assert requests.answer(requests.number) and requests.request is None
+    assert not requests.answer(requests.number)  # once
+    assert requests.tend(at(100.0)).step is Step.WAIT
 
 
 @pytest.mark.parametrize("missing", ["poses", "node"])
 def test_waits_for_poses_and_for_the_node_and_gives_up_in_the_end(missing):
-    errands = begun(PLAN)
+    requests = begun(PLAN)
     poses, ready = missing != "poses", frozenset() if missing == "node" else ALL
     for wall in (0.0, 3.0, 5.0):
-        assert errands.tend(at(wall, 0.0, poses, ready)).step is Step.WAIT
-    verdict = errands.tend(at(5.1, 0.0, poses, ready))
+        assert requests.tend(at(wall, 0.0, poses, ready)).step is Step.WAIT
+    verdict = requests.tend(at(5.1, 0.0, poses, ready))
     assert verdict.step is Step.GIVE_UP and verdict.message
     assert verdict.code is (JobError.POSES_STALE if missing == "poses" else JobError.NODE_LOST)
-    assert errands.errand is None
+    assert requests.request is None
 
 
 def test_a_node_that_returns_in_time_is_asked():
-    errands = begun(PLAN)
-    assert errands.tend(at(0.0, ready=frozenset())).step is Step.WAIT
-    assert errands.tend(at(4.9)).step is Step.ASK
+    requests = begun(PLAN)
+    assert requests.tend(at(0.0, ready=frozenset())).step is Step.WAIT
+    assert requests.tend(at(4.9)).step is Step.ASK
 
 
 def test_only_the_peer_of_the_errand_counts():
@@ -67,50 +67,50 @@ def test_only_the_peer_of_the_errand_counts():
 
 
 def test_a_silent_planner_is_asked_again_and_given_up_on_after_three_times():
-    errands = begun(PLAN)
+    requests = begun(PLAN)
     numbers = set()
     for wall in (0.0, 2.1, 4.2):
-        assert errands.tend(at(wall)).step is Step.ASK
-        assert not any(errands.answer(late) for late in numbers)
-        numbers.add(errands.number)
-    assert len(numbers) == errands.asks == ASKS
-    verdict = errands.tend(at(6.3))
+        assert requests.tend(at(wall)).step is Step.ASK
+        assert not any(requests.answer(late) for late in numbers)
+        numbers.add(requests.number)
+    assert len(numbers) == requests.asks == ASKS
+    verdict = requests.tend(at(6.3))
     assert (verdict.step, verdict.code) == (Step.GIVE_UP, JobError.NODE_LOST)
 
 
 def test_a_planner_that_shows_signs_of_life_may_take_for_ever():
-    errands = begun(PLAN)
-    errands.tend(at(0.0))
+    requests = begun(PLAN)
+    requests.tend(at(0.0))
     for wall in range(1, 1000):
-        errands.sign(errands.number, at(float(wall)))
-        assert errands.tend(at(wall + 0.9)).step is Step.WAIT
-    errands.sign(errands.number - 1, at(1000.0))  # of an earlier question: says nothing
-    assert errands.tend(at(1001.1)).step is Step.ASK
+        requests.sign(requests.number, at(float(wall)))
+        assert requests.tend(at(wall + 0.9)).step is Step.WAIT
+    requests.sign(requests.number - 1, at(1000.0))  # of an earlier question: says nothing
+    assert requests.tend(at(1001.1)).step is Step.ASK
 
 
 @pytest.mark.parametrize(
     ("wall", "stamp", "lost"), [(5.0, 0.9, False), (0.9, 5.0, False), (1.1, 1.1, True)]
 )
 def test_a_controller_is_lost_when_both_clocks_say_so(wall, stamp, lost):
-    errands = begun(PUSH)
-    errands.tend(at(0.0))
-    verdict = errands.tend(at(wall, stamp))
+    requests = begun(PUSH)
+    requests.tend(at(0.0))
+    verdict = requests.tend(at(wall, stamp))
     assert verdict.step is (Step.LOST if lost else Step.WAIT)
-    assert (errands.errand is None) == lost
+    assert (requests.request is None) == lost
 
 
 def test_a_delay_is_counted_in_pose_time():
-    errands = begun(Errand(Command.PLAN, {}, 3.0), at(10.0, 20.0))
-    assert errands.tend(at(1000.0, 22.9)).step is Step.WAIT
-    assert errands.tend(at(1000.0, 23.0)).step is Step.ASK
+    requests = begun(Request(Command.PLAN, {}, 3.0), at(10.0, 20.0))
+    assert requests.tend(at(1000.0, 22.9)).step is Step.WAIT
+    assert requests.tend(at(1000.0, 23.0)).step is Step.ASK
 
 
 def test_what_is_dropped_is_not_asked_and_not_answered():
-    errands = begun(PLAN)
-    errands.tend(at(0.0))
-    number = errands.number
-    errands.drop()
-    assert not errands.answer(number) and errands.tend(at(50.0)).step is Step.WAIT
+    requests = begun(PLAN)
+    requests.tend(at(0.0))
+    number = requests.number
+    requests.drop()
+    assert not requests.answer(number) and requests.tend(at(50.0)).step is Step.WAIT
 
 
 EVENTS = st.one_of(
@@ -126,48 +126,48 @@ EVENTS = st.one_of(
 @budget(max_examples=200)
 @given(st.lists(EVENTS, max_size=60))
 def test_invariants_of_any_walk(events):
-    errands = Errands(SETTINGS)
+    requests = Requests(SETTINGS)
     wall, since_heard, asks, current, begun_at = 0.0, 0.0, 0, None, 0.0
     for kind, a, b in events:
         if kind == "begin":
-            errands.begin(Errand(a, {}, b), at(wall))
+            requests.begin(Request(a, {}, b), at(wall))
             asks, current, begun_at = 0, None, wall + b
         elif kind == "drop":
-            errands.drop()
-            assert errands.errand is None
+            requests.drop()
+            assert requests.request is None
             current = None
         elif kind == "sign":
-            errands.sign(errands.number + a, at(wall))
+            requests.sign(requests.number + a, at(wall))
             since_heard = wall if a == 0 else since_heard
         elif kind == "answer":
-            number = errands.number + a
-            accepted = errands.answer(number)
+            number = requests.number + a
+            accepted = requests.answer(number)
             assert accepted == (current is not None and number == current)
             current = None if accepted else current
         else:
             wall += a
             now = at(wall, poses=kind == "tend", ready=frozenset(b or ()))
-            errand = errands.errand
-            verdict = errands.tend(now)
+            request = requests.request
+            verdict = requests.tend(now)
             if verdict.step is Step.ASK:
-                assert errand is not None and now.poses and now.ready(errand.peer)
+                assert request is not None and now.poses and now.ready(request.peer)
                 assert wall >= begun_at  # not before its delay
-                assert errands.number != current  # earlier questions are void
+                assert requests.number != current  # earlier questions are void
                 if current is not None:
-                    assert errand.peer is not Peer.CONTROLLER
+                    assert request.peer is not Peer.CONTROLLER
                     assert wall - since_heard > SETTINGS.answer_timeout
-                asks, current, since_heard = asks + 1, errands.number, wall
-                assert asks == errands.asks <= ASKS
+                asks, current, since_heard = asks + 1, requests.number, wall
+                assert asks == requests.asks <= ASKS
             elif verdict.step is Step.WAIT:
-                if errand is not None and current is not None and current != errands.number:
+                if request is not None and current is not None and current != requests.number:
                     current = None  # given up on, to be asked again
                 if current is not None:
                     least = SETTINGS.answer_timeout
-                    if errand.peer is Peer.CONTROLLER:
+                    if request.peer is Peer.CONTROLLER:
                         least = SETTINGS.controller_timeout
                     assert wall - since_heard <= least
             else:
-                assert errands.errand is None and verdict.code in (
+                assert requests.request is None and verdict.code in (
                     JobError.NODE_LOST,
                     JobError.POSES_STALE,
                 )
@@ -180,12 +180,12 @@ def test_every_errand_ends_when_nobody_answers(command, seed):
     """Whatever comes and goes in between: bounded by the times of waiting and asking."""
     random = np.random.default_rng(seed)
     often = random.uniform(0.0, 1.0, 2)
-    errands = begun(Errand(command))
+    requests = begun(Request(command))
     ended = math.inf
     for step in range(200):
         poses, there = random.random(2) < often
         now = at(0.5 * step, poses=bool(poses), ready=ALL if there else frozenset())
-        if errands.tend(now).step in (Step.GIVE_UP, Step.LOST):
+        if requests.tend(now).step in (Step.GIVE_UP, Step.LOST):
             ended = now.wall
             break
     assert ended <= ASKS * (SETTINGS.node_timeout + SETTINGS.answer_timeout + 1.0)

@@ -41,7 +41,7 @@ def standoffs(normals: Array, ahead: Array, away: float) -> Array:
     return back
 
 
-class Marshal:
+class Sequencer:
     """Finds who goes where, in which order and how."""
 
     def __init__(

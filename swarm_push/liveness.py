@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from push_estimation.obedience import Obedience
+from push_estimation.actuation_monitor import ActuationMonitor
 from push_model import se2
 from push_model.arrays import Array, Mask
 
@@ -18,7 +18,7 @@ _SPEED, _AWAY = 0.06, 0.7  # [m/s], [s] away from the jam then
 _TURNED = 0.5  # [rad] that shows that a robot lives
 
 
-class RollCall:
+class LivenessCheck:
     """Robots by name."""
 
     def __init__(self, dead: float, way: float, jammed: float, again: float, wheels: bool) -> None:
@@ -36,7 +36,7 @@ class RollCall:
         self._turning: dict[str, tuple[float, float]] = {}  # since when [s], from which heading
         self._trying: dict[str, tuple[float, float]] = {}  # likewise, of the dead
         self._names: tuple[str, ...] = ()
-        self._alone = self._held = Obedience(0, 1.0, 1.0)
+        self._alone = self._held = ActuationMonitor(0, 1.0, 1.0)
 
     def step(
         self, now: float, names: tuple[str, ...], poses: Array, twists: Array, touched: Mask
@@ -74,8 +74,8 @@ class RollCall:
         return dict.fromkeys(self._trying, (0.0, _RATE))
 
     def _watch(self, count: int) -> None:
-        self._alone = Obedience(count, self._patience, self._way)
-        self._held = Obedience(count, self._jammed, self._way)
+        self._alone = ActuationMonitor(count, self._patience, self._way)
+        self._held = ActuationMonitor(count, self._jammed, self._way)
 
     def _test(self, now: float, poses: Array, twists: Array) -> Array:
         """Turn whoever is in a jam, and judge it afterwards."""

@@ -15,9 +15,9 @@ from push_study.swarm_run import drive
 from push_study.uncertainty import uncertainty
 from swarm_push.crescent_law import CrescentLaw
 from swarm_push.law import Scene
+from swarm_push.liveness import LivenessCheck
 from swarm_push.region import covered_region
 from swarm_push.rim import Rim
-from swarm_push.roll_call import RollCall
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
 
 NAMES = ("a", "b", "c")
@@ -25,7 +25,7 @@ DT = 0.02
 
 
 def call(wheels=True):
-    return RollCall(2.0, 0.1, 6.0, 30.0, wheels)
+    return LivenessCheck(2.0, 0.1, 6.0, 30.0, wheels)
 
 
 def stand():

@@ -11,7 +11,7 @@ _LEVER = 0.03  # [m] at which turns count as ways
 _GAP = 0.2  # [s] between ticks from which on they are no longer one after the other
 
 
-class Obedience:
+class ActuationMonitor:
     """Tells which robots do not go although they are told to."""
 
     def __init__(self, count: int, patience: float, way: float) -> None:
