@@ -2,8 +2,8 @@
 
 It answers every frame of the pose stream with its robot's velocity and broadcasts its state to its
 neighbours. From the stream it takes its own pose, the object's, and those of bodies outside its
-swarm. The other robots' poses come from their messages. Messages from beyond the radius are ignored,
-and a set fraction of the rest is dropped.
+swarm. The other robots' poses come from their messages. Messages from beyond the radius are
+ignored, and a set fraction of the rest is dropped.
 """
 
 import sys
