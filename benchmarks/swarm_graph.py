@@ -55,7 +55,8 @@ def budget(scenario: Scenario, goal: Any, ticks: int) -> dict[str, float]:
         for name in ("step", "poses", "command_all"):
             setattr(world, name, timed(getattr(world, name), spent["world"]))
         node: Any = run.controller
-        node.job.step = timed(node.job.step, spent["job"])
+        job = node.method.job
+        job.step = timed(job.step, spent["job"])
         node._poses.take = timed(node._poses.take, spent["node"])
         parts = []
         for _ in range(_PARTS):

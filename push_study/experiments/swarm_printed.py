@@ -5,8 +5,8 @@ Long runs: a quarter of an hour of simulation each.
 
 from push_study.pool import Row
 from push_study.study import StudyOptions
-from push_study.swarm_run import SwarmTask, run
-from push_study.swarm_shapes import SHAPES, conclude, tasks_by
+from push_study.swarm.shapes import SHAPES, conclude, tasks_by
+from push_study.swarm.targets import SwarmTask, run
 
 __all__ = ["CHOOSES_WORLD", "SCENARIOS", "conclude", "tasks", "trial"]
 

@@ -16,7 +16,7 @@ import numpy as np
 from push_scenario.bodies import load_object
 from push_study.pool import Row
 from push_study.study import StudyOptions
-from push_study.swarm_rival import OURS, RIVALS, RivalTask, run
+from push_study.swarm.contest import OURS, RIVALS, RivalTask, run
 
 SCENARIOS = (
     "transport_square",

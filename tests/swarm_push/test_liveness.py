@@ -11,7 +11,7 @@ from push_model.occupancy import rasterise
 from push_model.specs import EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
 from push_study.group_world import GroupWorld
-from push_study.swarm_run import drive
+from tests.driving import drive
 from push_study.uncertainty import uncertainty
 from swarm_push.crescent_law import CrescentLaw
 from swarm_push.law import Scene
