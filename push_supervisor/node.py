@@ -1,7 +1,6 @@
 """The supervisor node: goals in, questions to planner and controller out, the job's state out."""
 
 import sys
-import time
 from typing import Any
 
 import numpy as np
@@ -68,8 +67,6 @@ class SupervisorNode(Node):
         self.surroundings = Surroundings(robot_spec, item_spec, others, self.settings)
         self.machine = Machine(self.settings, self._at_goal, self._touching)
         self._requests = Requests(self.settings)
-        self._wall = 0.0  # [s] that stands still while the world is paused
-        self._looked = time.monotonic()
         self._ticks = 0
         self._displaced = 0
         self._world: Any = None  # what the world says that robot and object are
@@ -180,8 +177,7 @@ class SupervisorNode(Node):
                 self._intake.feedback(self._feedback())
 
     def _on_watchdog(self) -> None:
-        """Wall time, for when no frames come."""
-        self._advance()
+        """Wall time, for when no frames come; in lockstep there is always one to come."""
         if self._poses.silence > 0.3:
             self._tend()
 
@@ -247,18 +243,11 @@ class SupervisorNode(Node):
         self._requests.begin(Request(command, arguments, delay), self._now())
         self._tend()
 
-    def _advance(self) -> None:
-        """Move the wall clock on, but for a pause of the world."""
-        now = time.monotonic()
-        if not self._poses.paused:
-            self._wall += now - self._looked
-        self._looked = now
-
     def _now(self) -> Moment:
         """The clocks and who is there."""
-        self._advance()
         known = self._pose(self.robot) is not None and self._pose(self.object) is not None
-        return Moment(self._wall, self._poses.stamp, known, self._peers.ready)
+        clock = self._poses.clock
+        return Moment(clock.now, self._poses.stamp, known, self._peers.ready, clock.lockstep)
 
     def _tend(self) -> None:
         """See to the request under way."""

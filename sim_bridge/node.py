@@ -32,6 +32,9 @@ from sim_bridge.world import World
 from sim_bridge.world_publishers import WorldPublishers
 from sim_bridge.worlds import steps_of, world_kind
 
+_PATIENT = 0.2  # [s] wall time without an answer until the bridge looks who is in the graph
+_SHOWN = 5  # names in a warning
+
 
 class BridgeNode(Node):
     """Steps a world at a pace, moves its robots as they are commanded, publishes what is seen."""
@@ -69,15 +72,16 @@ class BridgeNode(Node):
         self.period = 1.0 / self._rate
         self._decimation = max(1, round(self._rate / self.settings.tf_rate))
         self._diagnostics = Diagnostics(self, self._names, self._state)
-        self.outputs = WorldPublishers(self, self._names, self._diagnostics)
-        self._intake = CommandIntake(self, self._names, self._diagnostics, self._on_obeyed)
+        self.outputs = WorldPublishers(self, self._names, self._diagnostics, self.settings.lockstep)
+        self._intake = CommandIntake(self, self._names, self._diagnostics, self._on_answered)
         self._pace = RealTime(self.period, self.settings.real_time_factor)
         self._seed = self.settings.seed
         self.world: World | None = None
         self.running = False
         self._paused = False
         self._autostart = autostart
-        self.lockstep_timeouts = 0
+        self.unanswered = 0
+        """Ticks in lockstep that went on without an answer, because a commander had left."""
         self._build()
         service, at = self.create_service, self._names.world
         service(Reset, at("bridge/reset"), self._on_reset)
@@ -127,6 +131,11 @@ class BridgeNode(Node):
     def _named(self, rows: Rows) -> list[str]:
         return [self._intake.gate.names[row] for row in rows]
 
+    def _listed(self, rows: Rows) -> str:
+        """Robots in words, for a message."""
+        more = f" and {len(rows) - _SHOWN} more" if len(rows) > _SHOWN else ""
+        return ", ".join(self._named(rows[:_SHOWN])) + more
+
     def heard_by(self, count: int) -> bool:
         """Whether so many listen to the poses."""
         return bool(self.count_subscribers(self._names.world("poses")) >= count)
@@ -160,16 +169,26 @@ class BridgeNode(Node):
             for _ in range(self._pace.due(now)):
                 self._tick()
             return
-        late = self._lockstep.overdue(now, self.settings.lockstep_timeout)
-        if late.size or self._lockstep.ready:
-            if late.size:
-                self.lockstep_timeouts += 1
-                names = ", ".join(self._named(late))
-                self.get_logger().warning(f"no answer to tick {self.tick} from {names}")
-                self._intake.stop(late)
-                self._intake.forget(late)
-                self._commanded = self._intake.commanded()
+        if not self._lockstep.ready and self._lockstep.waited(now) > _PATIENT:
+            self._release_abandoned()
+        if self._lockstep.ready:
             self._advance()
+        elif self._lockstep.due_to_tell(now, self.settings.lockstep_warning):
+            names = self._listed(self._lockstep.waiting)
+            self.get_logger().warning(f"no answer to tick {self.tick} from {names}; waiting on")
+
+    def _release_abandoned(self) -> None:
+        """Do not wait for robots whose commander has left the graph; they are stopped."""
+        rows = self._intake.abandoned(self._lockstep.waiting)
+        if not rows.size:
+            return
+        self.unanswered += 1
+        text = f"whoever commanded {self._listed(rows)} has left; stopped at tick {self.tick}"
+        self.get_logger().warning(text)
+        self._intake.stop(rows)
+        self._intake.forget(rows)
+        self._commanded = self._intake.commanded()
+        self._lockstep.release(rows)
 
     def _advance(self) -> None:
         """Lockstep: tick until somebody must answer."""
@@ -180,13 +199,15 @@ class BridgeNode(Node):
             if not self._lockstep.ready or not self._commanded.any():
                 return
 
-    def _on_obeyed(self, stamp: float, rows: Rows) -> None:
-        """Robots were commanded in answer to the poses of a stamp [s]."""
+    def _on_answered(self, stamp: float, rows: Rows) -> None:
+        """Somebody answered the poses of a stamp [s] for robots."""
         if not (self.settings.lockstep and self.running):
             return
         if self._intake.changed or not self._commanded[rows].all():
             self._recount()
         self._lockstep.answer(round(stamp * self._rate), rows)
+        if not self._lockstep.ready and self._intake.all_have_spoken(stamp):
+            self._lockstep.release(self._intake.drop_unnamed(self._lockstep.waiting))
         if self._lockstep.ready:  # while paused it is kept for later
             self._advance()
 
@@ -263,7 +284,7 @@ class BridgeNode(Node):
         return {
             "sim time": f"{self.time:.2f}",
             "scenario": self._scenario.name,
-            "lockstep timeouts": self.lockstep_timeouts,
+            "unanswered ticks": self.unanswered,
             "stalls": self._pace.stalls,
             "paused": self._paused,
         }

@@ -39,8 +39,12 @@ class BridgeSettings:
     command_timeout_wall: float = bounded(
         0.5, low=0.05, high=10.0, doc="[s] wall time without a command, then wheels stop"
     )
-    lockstep_timeout: float = bounded(
-        2.0, low=0.05, high=60.0, doc="[s] wall time to wait for a tick's answers"
+    lockstep_warning: float = bounded(
+        2.0,
+        low=0.05,
+        high=600.0,
+        doc="Wall time without an answer to a tick in lockstep after which a warning names the "
+        "robots that are waited for (s). The world waits on.",
     )
     discovery_time: float = bounded(
         0.5, low=0.0, high=10.0, doc="[s] wall time to look for another bridge at start"

@@ -99,6 +99,31 @@ def test_a_controller_is_lost_when_both_clocks_say_so(wall, stamp, lost):
     assert (requests.request is None) == lost
 
 
+def locked(clock, ready=ALL):
+    """In lockstep: the clock is that of the poses."""
+    return Moment(clock, clock, True, ready.__contains__, lockstep=True)
+
+
+@pytest.mark.parametrize("request_", [PLAN, Request(Command.PATH, {})])
+def test_in_lockstep_a_planner_is_lost_only_when_it_leaves_the_graph(request_):
+    requests = begun(request_, locked(0.0))
+    assert requests.tend(locked(0.0)).step is Step.ASK
+    for clock in (3.0, 1e3, 1e9):  # fast simulations and slow planners
+        assert requests.tend(locked(clock)).step is Step.WAIT and requests.asks == 1
+    gone = frozenset()
+    assert requests.tend(locked(1e9 + 2.1, gone)).step is Step.WAIT and requests.asks == 1
+    assert requests.tend(locked(1e9 + 7.0, gone)).step is Step.WAIT
+    verdict = requests.tend(locked(1e9 + 7.2, gone))  # 5 s after it was to be asked again
+    assert (verdict.step, verdict.code) == (Step.GIVE_UP, JobError.NODE_LOST)
+
+
+def test_in_lockstep_a_controller_answers_in_pose_time():
+    requests = begun(PUSH, locked(0.0))
+    requests.tend(locked(0.0))
+    assert requests.tend(locked(1.0)).step is Step.WAIT
+    assert requests.tend(locked(1.1)).step is Step.LOST
+
+
 def test_a_delay_is_counted_in_pose_time():
     requests = begun(Request(Command.PLAN, {}, 3.0), at(10.0, 20.0))
     assert requests.tend(at(1000.0, 22.9)).step is Step.WAIT
@@ -186,6 +211,6 @@ def test_every_errand_ends_when_nobody_answers(command, seed):
         poses, there = random.random(2) < often
         now = at(0.5 * step, poses=bool(poses), ready=ALL if there else frozenset())
         if requests.tend(now).step in (Step.GIVE_UP, Step.LOST):
-            ended = now.wall
+            ended = now.clock
             break
     assert ended <= ASKS * (SETTINGS.node_timeout + SETTINGS.answer_timeout + 1.0)

@@ -54,10 +54,12 @@ def test_lockstep_waits_for_everybody_and_only_for_the_newest_frame():
     lockstep.expect(7, np.array([True, True, False]), now=1.0)
     lockstep.answer(7, np.array([0]))
     lockstep.answer(6, np.array([1]))
-    assert not lockstep.ready and lockstep.overdue(3.0, 1.0).tolist() == [1]
-    assert lockstep.overdue(1.5, 1.0).size == 0
+    assert not lockstep.ready and lockstep.waiting.tolist() == [1]
+    assert not lockstep.due_to_tell(1.5, 1.0)
+    assert [lockstep.due_to_tell(t, 1.0) for t in (3.0, 4.0, 1e6)] == [True, False, False]
+    assert not lockstep.ready and lockstep.waiting.tolist() == [1]  # for any time
     lockstep.answer(7, np.array([1, 2]))
-    assert lockstep.ready and lockstep.overdue(9.0, 1.0).size == 0
+    assert lockstep.ready and not lockstep.due_to_tell(9.0, 1.0)
     lockstep.expect(8, np.array([False, False, True]), now=9.0)
     assert not lockstep.ready
     lockstep.release(np.array([2]))  # it has gone
