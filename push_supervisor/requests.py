@@ -10,12 +10,12 @@ has left the graph.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
-from typing import Any
 
 from push_model.jobs import JobError
-from push_supervisor.machine import Command
+from push_supervisor import commands
+from push_supervisor.commands import Question
 from push_supervisor.settings import SupervisorSettings
 
 ASKS = 3
@@ -30,13 +30,13 @@ class Peer(Enum):
     CONTROLLER = "the controller"
 
 
-PEERS = {
-    Command.PLAN: Peer.PLANNER,
-    Command.PATH: Peer.PATHS,
-    Command.FOLLOW_PATH: Peer.CONTROLLER,
-    Command.FOLLOW_APPROACH: Peer.CONTROLLER,
-    Command.FOLLOW_PUSH: Peer.CONTROLLER,
-    Command.FOLLOW_RETREAT: Peer.CONTROLLER,
+PEERS: Mapping[type[Question], Peer] = {
+    commands.MakePlan: Peer.PLANNER,
+    commands.FindPath: Peer.PATHS,
+    commands.FollowPath: Peer.CONTROLLER,
+    commands.FollowApproach: Peer.CONTROLLER,
+    commands.FollowPush: Peer.CONTROLLER,
+    commands.FollowRetreat: Peer.CONTROLLER,
 }
 """Who is asked for what."""
 
@@ -56,16 +56,15 @@ class Moment:
 
 @dataclass(frozen=True)
 class Request:
-    """What to ask: the command and what comes with it. delay: [s] of pose time to wait before."""
+    """What to ask. delay: [s] of pose time to wait before."""
 
-    command: Command
-    arguments: Mapping[str, Any] = field(default_factory=dict)
+    command: Question
     delay: float = 0.0
 
     @property
     def peer(self) -> Peer:
         """Who is asked."""
-        return PEERS[self.command]
+        return PEERS[type(self.command)]
 
 
 class Step(Enum):

@@ -103,7 +103,7 @@ class BridgeNode(Node):
         self._footing = Footing(s)
         self._disturbances = Disturbances(s.events, self._rate, self._footing)
         self.outputs.scenario(s)
-        late = self._capture.delay * self.period
+        late = self._capture.longest_latency
         wall = math.inf if self.settings.lockstep else self.settings.command_timeout_wall
         types = {robot: spec for robot, (spec, _) in s.robots.items()}
         self._intake.connect(self.world, types, self.settings.command_timeout + late, wall)
@@ -123,6 +123,11 @@ class BridgeNode(Node):
     def time(self) -> float:
         """[s] sim time."""
         return float(self.tick / self._rate)
+
+    @property
+    def applied_latency(self) -> tuple[float, float]:
+        """[s] Mean and standard deviation of the latency of the poses since the start."""
+        return self._capture.applied_latency
 
     def commanded(self) -> list[str]:
         """Robots that somebody publishes commands for."""
@@ -193,9 +198,9 @@ class BridgeNode(Node):
     def _advance(self) -> None:
         """Lockstep: tick until somebody must answer."""
         while self.running and not self._paused:
-            stamp = self._tick()
-            if stamp is not None:
-                self._lockstep.expect(stamp, self._commanded, time.monotonic())
+            frame = self._tick()
+            if frame is not None:
+                self._lockstep.expect(frame, self._commanded, time.monotonic())
             if not self._lockstep.ready or not self._commanded.any():
                 return
 
@@ -205,7 +210,7 @@ class BridgeNode(Node):
             return
         if self._intake.changed or not self._commanded[rows].all():
             self._recount()
-        self._lockstep.answer(round(stamp * self._rate), rows)
+        self._lockstep.answer(_number_of(stamp), rows)
         if not self._lockstep.ready and self._intake.all_have_spoken(stamp):
             self._lockstep.release(self._intake.drop_unnamed(self._lockstep.waiting))
         if self._lockstep.ready:  # while paused it is kept for later
@@ -217,7 +222,7 @@ class BridgeNode(Node):
         self._lockstep.release(np.flatnonzero(~self._commanded))
 
     def _tick(self) -> int | None:
-        """Step the physics by one control tick and publish; the stamp of the frame published."""
+        """Step the physics by one control tick and publish; the number of the frame published."""
         assert self.world is not None
         world, outputs = self.world, self.outputs
         for robot in self._named(self._intake.watch(self.time)):
@@ -239,7 +244,7 @@ class BridgeNode(Node):
         outputs.seen(frame, measured)
         if self.tick % self._decimation == 0:
             outputs.look(self._scenario, frame, self.tick // self._decimation, measured)
-        return frame.stamp
+        return _number_of(measured)
 
     def _on_reset(self, request: Any, response: Any) -> Any:
         assert self.world is not None
@@ -297,6 +302,11 @@ class BridgeNode(Node):
             self.world.close()
             self.world = None
         super().destroy_node()
+
+
+def _number_of(stamp: float) -> int:
+    """Of the frame of a stamp [s]: its nanoseconds, as messages carry them."""
+    return round(1e9 * stamp)
 
 
 def main() -> int:

@@ -22,7 +22,7 @@ class Lockstep:
         """Whether nobody is waited for."""
 
     def expect(self, frame: int, robots: Mask, now: float) -> None:
-        """A frame (tick number) was published at monotonic time now [s]; robots must answer it.
+        """A frame, by its number, was published at monotonic time now [s]; robots must answer it.
 
         robots: ``(n,)`` mask.
         """
