@@ -7,6 +7,7 @@ pushes, and what is done when something goes wrong.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -25,11 +26,12 @@ from push_scenario.bodies import load_object, load_robot
 from push_study.group_world import GroupWorld
 from push_study.pool import Row
 from push_study.study import StudyOptions
+from push_study.summary import by_cell
 from push_study.uncertainty import uncertainty
 
 SCENARIOS = ("open", "obstacles", "dead")
 """Nothing in the way; obstacles; obstacles, and one of four robots dies in its first push."""
-CHOOSES_WORLD = True
+OPTIONS = {"uncertainty": "mild", "world": "pybullet"}
 ROBOT = "epuck_ring"
 SIZE = (4.0, 3.0)  # [m]
 _GOAL = 0.02, 0.1  # [m], [rad] that count as success
@@ -188,13 +190,16 @@ def trial(task: GoalTask) -> Row:
         taken, drawn = world.time, world.drawn
     away, turned = float(np.hypot(off[0], off[1])), abs(float(off[2]))
     ended = not job.busy and job.error is JobError.NONE
+    reason = "" if ended else job.reason
+    if ended and collisions:
+        reason = f"something was touched that is not the object, in {collisions} ticks"
     return {
         "scenario": task.scenario,
         "seed": task.seed,
         "robots": task.robots,
         "sides": task.sides,
-        "success": bool(ended and away <= _GOAL[0] and turned <= _GOAL[1]),
-        "reason": job.reason if job.busy or job.error is not JobError.NONE else "",
+        "success": bool(ended and away <= _GOAL[0] and turned <= _GOAL[1] and not collisions),
+        "reason": reason,
         "killed": killed,
         "position_error_m": away,
         "orientation_error_rad": turned,
@@ -234,6 +239,17 @@ def _in_the_middle(job: GroupJob) -> bool:
     if job.state is not JobPhase.PUSHING or job.plan is None or job.last is None:
         return False
     return job.last.time > 0.5 * job.plan.trajectory.duration
+
+
+def statistics(rows: list[Row]) -> dict[str, Any]:
+    """Means by world and number of robots, over the goals that were reached."""
+    return dict(
+        by_cell(
+            rows,
+            ("scenario", "robots"),
+            ("position_error_m", "orientation_error_rad", "duration_s"),
+        )
+    )
 
 
 def conclude(options: StudyOptions, tasks: Sequence[GoalTask], rows: list[Row]) -> None:

@@ -22,8 +22,8 @@ class Part:
 
     centre: ``(2,)`` [m]; radius: [m] of the disc, or of the circle about centre that holds the
     outline ``(n, 2)``, which is counter-clockwise. friction: of its surface; that of a contact is
-    the product of both. robot_friction: of a contact between two robots that are alike; 0 for what is
-    no robot. Of two that differ it is the geometric mean.
+    the product of both. robot_friction: of a contact between two robots that are alike; 0 for what
+    is no robot. Of two that differ it is the geometric mean.
     """
 
     centre: Array
@@ -50,8 +50,8 @@ class PartTable:
     """Parts of all bodies; fixed ones have body -1.
 
     body, first, count ``(p,)``: whose it is; its vertices in ``vertices (v, 2)``, none for a disc.
-    local ``(p, 2)``, radius ``(p,)`` [m]: the circle that holds it. friction ``(p, 2)``: its own, and
-    the root of that on its like, -1 for what is no robot.
+    local ``(p, 2)``, radius ``(p,)`` [m]: the circle that holds it. friction ``(p,
+    2)``: its own, and the root of that on its like, -1 for what is no robot.
     """
 
     body: Rows
