@@ -210,8 +210,8 @@ class BridgeNode(Node):
             return
         if self._intake.changed or not self._commanded[rows].all():
             self._recount()
-        self._lockstep.answer(_number_of(stamp), rows)
-        if not self._lockstep.ready and self._intake.all_have_spoken(stamp):
+        newest = self._lockstep.answer(_number_of(stamp), rows)
+        if newest and not self._lockstep.ready and self._intake.all_have_spoken(stamp):
             self._lockstep.release(self._intake.drop_unnamed(self._lockstep.waiting))
         if self._lockstep.ready:  # while paused it is kept for later
             self._advance()

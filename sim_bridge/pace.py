@@ -30,10 +30,12 @@ class Lockstep:
         self._waiting = robots.copy()
         self.ready = not robots.any()
 
-    def answer(self, frame: int, rows: Rows) -> None:
-        """Robots answered a frame."""
-        if frame == self._frame:
-            self.release(rows)
+    def answer(self, frame: int, rows: Rows) -> bool:
+        """Robots answered a frame; whether it is the newest one."""
+        if frame != self._frame:
+            return False
+        self.release(rows)
+        return True
 
     def release(self, rows: Rows) -> None:
         """Wait no longer for robots."""
