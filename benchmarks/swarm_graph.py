@@ -71,7 +71,7 @@ def budget(scenario: Scenario, goal: Any, ticks: int) -> dict[str, float]:
             parts.append(np.array([physics, job, whole - job, total - physics - whole]) / done)
         if not node.busy:
             raise RuntimeError("the job ended before the measurement did")
-        if run.bridge.lockstep_timeouts:
+        if run.bridge.unanswered:
             raise RuntimeError("a tick was not answered")
     table = 1e3 * np.median(parts, axis=0)
     return dict(zip(("world", "job", "node", "rest"), map(float, table), strict=True))

@@ -128,5 +128,7 @@ def tell(event: JobEvent) -> None:
     team = f"{event.team}: " if event.team else ""
     if event.kind == "state":
         print(f"  {team}{event.state:12s} {event.reason}", flush=True)
+    elif event.kind in ("silent", "returned"):
+        print(f"  {team}{event.reason}", flush=True)
     elif event.distance is not None:
         print(f"  {team}{event.distance:6.3f} m to go", flush=True)

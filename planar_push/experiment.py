@@ -14,9 +14,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--trials", type=whole(1), default=5, help="of each scenario")
     parser.add_argument("--seed", type=whole(0), default=1, help="of the first trial")
     parser.add_argument(
-        "--uncertainty", default="mild", help="of the world: none, mild or hard (docs/results.md)"
+        "--uncertainty",
+        help="of the world: none, mild or hard (docs/results.md); refused where there is no choice",
     )
-    parser.add_argument("--world", default="", help="pybullet or planar, where there is a choice")
+    parser.add_argument("--world", help="pybullet or planar; refused where there is no choice")
     parser.add_argument("--out", default="", help="folder; one that has the beginning is gone on")
     parser.add_argument("--scheduler", default="", help="address of a Dask scheduler")
     parser.add_argument("--workers", type=whole(0), default=0, help="processes here; 0: one a core")
@@ -35,8 +36,9 @@ def run(arguments: argparse.Namespace) -> int:
         Path(out),
         arguments.scheduler,
         arguments.workers,
-        arguments.uncertainty,
-        arguments.world,
+        arguments.uncertainty or "mild",
+        arguments.world or "",
+        frozenset(o for o in ("uncertainty", "world") if getattr(arguments, o) is not None),
     )
     summary = run_study(arguments.name, options)
     print(f"\n{out}/summary.json")

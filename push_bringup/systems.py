@@ -27,9 +27,9 @@ LIVE: dict[str, dict[str, Any]] = {"controller": {"tracker": {"deadline": 0.03}}
 """Settings of live use, where the scenario is silent. A run in lockstep must not depend on the wall
 clock: there a solve has no deadline [s]."""
 
-LOCKSTEP: dict[str, dict[str, Any]] = {"bridge": {"lockstep_timeout": 60.0}}
-"""Settings of a run in lockstep, where the scenario is silent. All nodes are in one process: who is
-waited for [s] is never dead, it is the machine that is busy."""
+LOCKSTEP: dict[str, dict[str, Any]] = {"bridge": {"lockstep_warning": 60.0}}
+"""Settings of a run in lockstep, where the scenario is silent. All nodes are in one process, so a
+late answer [s] means a busy machine."""
 
 GROUP_MOST = 5
 """Robots of a group at most."""

@@ -138,7 +138,7 @@ class MethodNode(Node):
         self._watchdog = self.create_timer(
             0.1, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
-        self._waiting = time.monotonic()
+        self._waiting = self._poses.clock.now  # since when the object is not seen
         self._look_after_task()
 
     def _declare(
@@ -229,7 +229,7 @@ class MethodNode(Node):
 
     def take_task(self, task: Task) -> None:
         """See TaskHost."""
-        self._waiting, self._missing = time.monotonic(), 0.0
+        self._waiting, self._missing = self._poses.clock.now, 0.0
         if self.method is not None:
             self.method.begin(task, self.beliefs.current)
         self._look_after_task()
@@ -267,7 +267,7 @@ class MethodNode(Node):
             if self._missing > PATIENCE:
                 self.end_job(JobError.POSES_STALE, f"no poses of '{self.object}'")
             return {}
-        self._missing, self._waiting = 0.0, time.monotonic()
+        self._missing, self._waiting = 0.0, self._poses.clock.now
         robots = {n: p for n in self.robots if (p := self._poses.pose(n)) is not None}
         self._seen = seen = Seen(self._poses.stamp, item, robots, self._poses.discs(self._others))
         if method is None or not self.busy:
@@ -290,9 +290,9 @@ class MethodNode(Node):
         self._reports.publish(message)
 
     def _on_watchdog(self) -> None:
-        """Wall time, for when no frame comes."""
-        now = time.monotonic()
-        if not self.busy or self._poses.paused:
+        """For when no frame comes; in lockstep, where the world waits, nothing happens."""
+        now = self._poses.clock.now
+        if not self.busy:
             self._waiting = now
         elif now - self._waiting > PATIENCE and self._poses.silence > PATIENCE:
             self.end_job(JobError.POSES_STALE, "no poses arrive")

@@ -55,6 +55,7 @@ class GroupWorld:
             name: (doubt.draw_robot(name, robot, self._random, self.drawn), pose)
             for name, pose in zip(self.names, starts, strict=True)
         }
+        robots = doubt.draw_robot_friction(robots, self._random, self.drawn)
         self._holonomic = isinstance(robot.drive, HolonomicDrive)
         kind = world_kind(world)
         self._world = kind.make(

@@ -7,6 +7,7 @@ pushes, and what is done when something goes wrong.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -27,12 +28,13 @@ from push_study.graph_run import LockstepRun
 from push_study.pool import Row
 from push_study.rooms import scattered
 from push_study.study import StudyOptions
+from push_study.summary import by_cell
 from push_study.team_run import made_scenario, run_team
 from push_study.uncertainty import uncertainty
 
 SCENARIOS = ("open", "obstacles", "dead")
 """Nothing in the way; obstacles; obstacles, and one of four robots dies in its first push."""
-CHOOSES_WORLD = True
+OPTIONS = {"uncertainty": "mild", "world": "pybullet"}
 ROBOT = "epuck_ring"
 SIZE = (4.0, 3.0)  # [m]
 _GOAL = 0.02, 0.1  # [m], [rad] that count as success
@@ -190,6 +192,17 @@ def _in_the_middle(job: GroupJob) -> bool:
     if job.state is not JobPhase.PUSHING or job.plan is None or job.last is None:
         return False
     return job.last.time > 0.5 * job.plan.trajectory.duration
+
+
+def statistics(rows: list[Row]) -> dict[str, Any]:
+    """Means by world and number of robots, over the goals that were reached."""
+    return dict(
+        by_cell(
+            rows,
+            ("scenario", "robots"),
+            ("position_error_m", "orientation_error_rad", "duration_s"),
+        )
+    )
 
 
 def conclude(options: StudyOptions, tasks: Sequence[GoalTask], rows: list[Row]) -> None:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import matplotlib
 
@@ -17,13 +18,14 @@ from push_scenario.bodies import load_object, load_robot
 from push_study.pool import Row
 from push_study.rooms import around
 from push_study.study import StudyOptions
+from push_study.summary import by_cell
 from push_study.swarm.targets import positions
 from push_study.team_run import made_scenario, run_team
 from push_study.uncertainty import uncertainty
 
 SCENARIOS = ("swarm_square",)
 """The object."""
-CHOOSES_WORLD = True
+OPTIONS = {"uncertainty": "mild", "world": "planar"}
 ROBOTS = (8, 20, 50, 100, 200, 500, 1000)
 DISTANCE = 1.5  # [m]
 REACHED = 0.1  # [m]
@@ -77,6 +79,11 @@ def trial(task: ScaleTask) -> Row:
         taken = outcome.charged
         row |= {"duration_s": taken, "lambda": taken * disc.max_speed / DISTANCE}
     return row
+
+
+def statistics(rows: list[Row]) -> dict[str, Any]:
+    """Mean Lambda and time by number of robots."""
+    return dict(by_cell(rows, ("robots",), ("lambda", "duration_s")))
 
 
 def conclude(options: StudyOptions, tasks: Sequence[ScaleTask], rows: list[Row]) -> None:

@@ -10,6 +10,7 @@ bends: they cannot push on before.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import matplotlib
 
@@ -34,7 +35,7 @@ from swarm_push.rim import Rim
 
 SCENARIOS = ("swarm_square",)
 """Objects, where none are named."""
-CHOOSES_WORLD = True
+OPTIONS = {"uncertainty": "mild", "world": "planar"}
 ROBOTS, DEAD = 10, 4
 _HALF, _REACH = 2.0, 1.3  # [m] of the room, and of positions
 _LEAST = 0.8  # [m] between positions
@@ -161,6 +162,13 @@ def _angle(first: tuple[float, float], second: tuple[float, float]) -> float:
     back, on = -half, np.array(second) - half
     cosine = float(back @ on / (np.hypot(*back) * np.hypot(*on)))
     return math.acos(max(-1.0, min(1.0, cosine)))
+
+
+def statistics(rows: list[Row]) -> dict[str, Any]:
+    """Medians of the ratios over the trials that came through all four runs."""
+    good = [r for r in rows if r["success"]]
+    names = ("dead_over_alive", "moved_over_direct", "with_the_arc")
+    return {f"{n}_median": float(np.median([r[n] for r in good])) for n in names if good}
 
 
 def conclude(options: StudyOptions, tasks: Sequence[UpsetTask], rows: list[Row]) -> None:
