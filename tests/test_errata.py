@@ -176,8 +176,12 @@ def test_2_53_is_linear_in_the_robot_frame(robot, box):
     """Truth: the path of a point fixed to the robot, differentiated numerically. Linearised about a
     heading in the map, as printed, the same motion is off by the heading's change."""
     side = push_sides(robot, box, 1.0)[0]
-    contact = Contact(side.nominal, line_contact(robot, box, side.grasp))
-    line, mpc = contact.line, ContactForceMpc(ContactForceSettings(), robot.differential)
+    centred = line_contact(robot, box, side.grasp)
+    line = centred.moved(0.0, 0.008)
+    contact, mpc = (
+        Contact(side.nominal, line),
+        ContactForceMpc(ContactForceSettings(), robot.differential),
+    )
     p, random = mpc.settings.horizon, np.random.default_rng(6)
     qp = mpc.programme(
         np.zeros(5),
@@ -201,8 +205,8 @@ def test_2_53_is_linear_in_the_robot_frame(robot, box):
         worst = max(worst, np.linalg.norm(v * (tangent - unit(theta))) / v)
     assert worst > 0.015
     for kappa in np.linspace(-4.0, 4.0, 161):  # the forces that it leaves: the stable curvatures
-        twist = [1.0 - kappa * line.centre[1], kappa * line.centre[0], kappa]
-        held = nnls(line.motion_of_forces, np.array(twist))[1] < 1e-9
+        twist = [1.0 - kappa * centred.centre[1], kappa * centred.centre[0], kappa]
+        held = nnls(centred.motion_of_forces, np.array(twist))[1] < 1e-9
         if min(abs(kappa - contact.limits.minimum), abs(kappa - contact.limits.maximum)) > 1e-3:
             assert held == (contact.limits.minimum <= kappa <= contact.limits.maximum)
 
