@@ -7,10 +7,21 @@ from pathlib import Path
 
 import pytest
 
+from grasp_opt.group_control import GroupControlSettings
+from grasp_opt.group_job import GroupJobSettings
+from grasp_opt.group_push import GroupPushSettings
+from grasp_opt.step_planner import StepSettings
 from push_model.jobs import JobError
+from push_mpc.settings import ControllerSettings, MpcSettings, TrackerSettings
 from push_mpc.task import TrackError
-from push_planner import PlanError
+from push_mpc.torque_tracker import TorqueTrackerSettings
+from push_mpc.wheel_slip_nmpc import WheelSlipSettings
+from push_planner import PlanError, PlannerSettings
 from push_planner.robot_path import RobotPathError
+from push_supervisor import SupervisorSettings
+from swarm_push.agent import AgentSettings
+from swarm_push.laws import LawSettings
+from swarm_push.swarm_job import SwarmJobSettings
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -84,3 +95,31 @@ def test_files_that_a_page_names_exist(page):
             assert (ROOT / name).is_file(), name
         else:
             assert name in known or name.endswith((".yaml", ".md")), name
+
+
+SECTIONS = {
+    "planner": {"": PlannerSettings},
+    "controller": {"": ControllerSettings, "mpc": MpcSettings, "tracker": TrackerSettings},
+    "supervisor": {"": SupervisorSettings},
+    "torque_controller": {"nmpc": WheelSlipSettings, "tracker": TorqueTrackerSettings},
+    "group": {"": GroupJobSettings, "control": GroupControlSettings, "push": GroupPushSettings},
+    "optimizer": {"": StepSettings},
+    "swarm": {"": SwarmJobSettings, "law": LawSettings, "agents": AgentSettings},
+}
+SYSTEMS = [ROOT / "docs" / f"{name}.md" for name in ("single-robot", "group", "swarm", "torque")]
+
+
+@pytest.mark.parametrize("page", SYSTEMS, ids=lambda p: p.name)
+def test_defaults_that_a_page_tells_are_those_of_the_settings(page):
+    found = re.findall(r"^\| (\w+) \| `([\w.]+)` \| (.+?) \| .+ \|$", page.read_text(), re.M)
+    assert len(found) >= 5
+    for node, name, told in found:
+        section, _, field = name.rpartition(".")
+        value = getattr(SECTIONS[node][section](), field)
+        if isinstance(value, bool | str):
+            assert told.strip("`") == (value if isinstance(value, str) else str(value).lower()), (
+                name
+            )
+        else:
+            number, _, unit = told.partition(" ")
+            assert float(number) * (1e-3 if unit == "mm" else 1.0) == pytest.approx(value), name
