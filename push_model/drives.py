@@ -1,4 +1,4 @@
-"""What moves a robot and how fast: the ``drive`` of a robot type, told by ``kind``."""
+"""The ``drive`` of a robot type, chosen by ``kind``: what moves the robot, and how fast."""
 
 import math
 from dataclasses import field
@@ -13,15 +13,20 @@ class SpeedDrive(DifferentialDrive):
     """Two wheels whose speed is controlled, as on an e-puck."""
 
     kind: Literal["differential"] = field(default="differential", kw_only=True)
-    wheel_radius: float = bounded(low=1e-3, high=1.0, doc="[m]")
-    half_track: float = bounded(low=1e-3, high=1.0, doc="[m] half the wheel distance")
+    wheel_radius: float = bounded(low=1e-3, high=1.0, doc="[m] radius of a wheel")
+    half_track: float = bounded(low=1e-3, high=1.0, doc="[m] half the distance between the wheels")
     max_wheel_speed: float = bounded(low=1e-2, high=100.0, doc="[rad/s]")
     wheel_mass: float = bounded(low=1e-4, high=50.0, doc="[kg] of one wheel")
-    wheel_torque: float = bounded(low=1e-4, high=100.0, doc="[Nm] greatest motor torque")
+    wheel_torque: float = bounded(low=1e-4, high=100.0, doc="[Nm] greatest torque of a motor")
     wheel_inertia: float = bounded(
-        0.0, low=0.0, high=100.0, doc="[kg m^2] about the axle, with its geared motor; 0: a ball's"
+        0.0,
+        low=0.0,
+        high=100.0,
+        doc="[kg m^2] of a wheel with its geared motor; 0: of a solid ball",
     )
-    wheel_friction: float = bounded(1.0, low=0.0, high=3.0, doc="wheel on floor")
+    wheel_friction: float = bounded(
+        1.0, low=0.0, high=3.0, doc="friction coefficient of wheel and floor"
+    )
 
 
 @settings
@@ -29,23 +34,29 @@ class TorqueDrive(DifferentialDrive):
     """Two wheels whose torque is controlled, as on the Pioneer of section 2.3."""
 
     kind: Literal["torque"] = field(default="torque", kw_only=True)
-    wheel_radius: float = bounded(low=1e-3, high=1.0, doc="[m] r")
-    half_track: float = bounded(low=1e-3, high=1.0, doc="[m] l, half the wheel distance")
+    wheel_radius: float = bounded(low=1e-3, high=1.0, doc="[m] radius r of a wheel")
+    half_track: float = bounded(
+        low=1e-3, high=1.0, doc="[m] half the distance l between the wheels"
+    )
     max_wheel_speed: float = bounded(low=1e-2, high=100.0, doc="[rad/s]")
-    max_torque: float = bounded(low=1e-4, high=1000.0, doc="[Nm] at one wheel")
+    max_torque: float = bounded(low=1e-4, high=1000.0, doc="[Nm] greatest torque at one wheel")
     wheel_mass: float = bounded(low=1e-4, high=50.0, doc="[kg] of one wheel")
-    wheel_inertia: float = bounded(low=1e-9, high=100.0, doc="[kg m^2] I_w about the axle")
-    wheel_friction: float = bounded(1.0, low=0.0, high=3.0, doc="mu, wheel on floor")
+    wheel_inertia: float = bounded(
+        low=1e-9, high=100.0, doc="[kg m^2] I_w of a wheel about the axle"
+    )
+    wheel_friction: float = bounded(
+        1.0, low=0.0, high=3.0, doc="friction coefficient mu of wheel and floor"
+    )
 
 
 @settings
 class HolonomicDrive:
-    """Traction in any direction, as of a disc of a swarm."""
+    """Traction in any direction, as for a disc of a swarm."""
 
     kind: Literal["holonomic"] = field(default="holonomic", kw_only=True)
-    max_speed: float = bounded(low=1e-3, high=100.0, doc="[m/s] in any direction")
-    max_turn_rate: float = bounded(low=1e-2, high=1000.0, doc="[rad/s]")
-    max_force: float = bounded(low=1e-3, high=10000.0, doc="[N] of its traction")
+    max_speed: float = bounded(low=1e-3, high=100.0, doc="[m/s] greatest speed in any direction")
+    max_turn_rate: float = bounded(low=1e-2, high=1000.0, doc="[rad/s] greatest turn rate")
+    max_force: float = bounded(low=1e-3, high=10000.0, doc="[N] greatest traction")
 
     def saturate(self, vx: float, vy: float, omega: float) -> tuple[float, float, float]:
         """The feasible twist of the same direction and rotation centre: scaled by one factor."""

@@ -11,49 +11,103 @@ class PlannerSettings:
     """Names follow section 2.2; lengths in [m], angles in [rad]."""
 
     planner: Literal["lazy", "thesis"] = bounded(
-        "lazy", doc="layer 2: lazy A* with improvements, or Algorithms 1 and 2 as printed"
+        "lazy",
+        doc="layer 2: lazy A* with improvements, or Algorithms 1 and 2 of the thesis as printed",
     )
-    length_weight: float = bounded(1.0, low=0.0, high=100.0, doc="lambda_1 of (2.1)")
-    clearance_weight: float = bounded(0.05, low=0.0, high=100.0, doc="lambda_2 of (2.1) [m^2]")
-    clearance_levels: int = bounded(4, low=1, high=20, doc="thresholds of the bottleneck sweep")
-    rrt_iterations: int = bounded(1200, low=50, high=200000, doc="RRT* iterations per threshold")
-    rrt_range: float = bounded(0.3, low=0.02, high=5.0, doc="[m] longest RRT* extension")
-    waypoint_spacing: float = bounded(0.3, low=0.02, high=5.0, doc="[m] between waypoints on Gamma")
-    heading_offsets: tuple[float, ...] = (0.0, 0.5, -0.5, 1.0, -1.0)
-    lateral_offsets: tuple[float, ...] = (0.0, 0.25, -0.25, 0.5, -0.5)
-    run_lengths: tuple[float, ...] = (0.15, 0.3, 0.6)
-    scattered_poses: tuple[int, ...] = (0, 300, 1000)
+    length_weight: float = bounded(
+        1.0, low=0.0, high=100.0, doc="weight lambda_1 of the path length in (2.1)"
+    )
+    clearance_weight: float = bounded(
+        0.05, low=0.0, high=100.0, doc="[m^2] weight lambda_2 of the inverse clearance in (2.1)"
+    )
+    clearance_levels: int = bounded(
+        4, low=1, high=20, doc="number of minimum clearances for which a guide path is searched"
+    )
+    rrt_iterations: int = bounded(
+        1200, low=50, high=200000, doc="RRT* iterations for each minimum clearance"
+    )
+    rrt_range: float = bounded(
+        0.3, low=0.02, high=5.0, doc="[m] longest extension of the RRT* tree"
+    )
+    waypoint_spacing: float = bounded(
+        0.3, low=0.02, high=5.0, doc="[m] distance between waypoints on the guide path"
+    )
+    heading_offsets: tuple[float, ...] = bounded(
+        (0.0, 0.5, -0.5, 1.0, -1.0), doc="[rad] headings tried at a waypoint, relative to the path"
+    )
+    lateral_offsets: tuple[float, ...] = bounded(
+        (0.0, 0.25, -0.25, 0.5, -0.5),
+        doc="[m] lateral positions tried at a waypoint, relative to the path",
+    )
+    run_lengths: tuple[float, ...] = bounded(
+        (0.15, 0.3, 0.6), doc="[m] lengths of runs out of the start and into the goal"
+    )
+    scattered_poses: tuple[int, ...] = bounded(
+        (0, 300, 1000), doc="random poses near the guide path that are added in each search"
+    )
     heuristic_weight: float = bounded(
-        3.0, low=1.0, high=100.0, doc="of the guessed cost, where a search with 1 does not end"
+        3.0,
+        low=1.0,
+        high=100.0,
+        doc="weight of the estimated cost-to-go, used if a search with weight 1 does not finish",
     )
-    max_expansions: int = bounded(1200, low=1, high=10000000, doc="pushes tried in one search")
+    max_expansions: int = bounded(
+        1200, low=1, high=10000000, doc="maximum number of pushes evaluated in one search"
+    )
     total_expansions: int = bounded(
-        7200, low=1, high=10000000, doc="pushes tried until there is a plan"
+        7200,
+        low=1,
+        high=10000000,
+        doc="maximum number of pushes evaluated until a first plan is found",
     )
     improvement_expansions: int = bounded(
-        1500, low=0, high=10000000, doc="pushes tried after the first plan"
+        1500, low=0, high=10000000, doc="maximum number of pushes evaluated after the first plan"
     )
     refinement: float = bounded(
-        0.1, low=0.001, high=2.0, doc="[m] by which an improvement moves poses, halved every two"
+        0.1,
+        low=0.001,
+        high=2.0,
+        doc="[m] by which improvement rounds move poses; halved every two rounds",
     )
-    push_cost: float = bounded(0.05, low=0.0, high=10.0, doc="[m] added for the stop of each push")
-    side_change_cost: float = bounded(0.3, low=0.0, high=10.0, doc="[m] added for a change of side")
+    push_cost: float = bounded(
+        0.05, low=0.0, high=10.0, doc="[m] path length that each push costs in addition to its own"
+    )
+    side_change_cost: float = bounded(
+        0.3, low=0.0, high=10.0, doc="[m] path length that a change of the pushed side costs"
+    )
     friction_trust: float = bounded(
         0.75, low=0.1, high=1.0, doc="fraction of the stable curvature that plans may use"
     )
-    safety_distance: float = bounded(0.012, low=0.0, high=1.0, doc="[m] kept from obstacles")
-    standoff: float = bounded(0.06, low=0.005, high=2.0, doc="[m] behind contact, before a push")
-    push_speed: float = bounded(0.07, low=0.005, high=2.0, doc="[m/s]")
-    push_acceleration: float = bounded(0.05, low=0.005, high=5.0, doc="[m/s^2]")
-    move_speed: float = bounded(0.1, low=0.005, high=2.0, doc="[m/s] of the robot alone")
-    move_acceleration: float = bounded(0.15, low=0.005, high=5.0, doc="[m/s^2]")
-    turn_rate: float = bounded(1.5, low=0.05, high=10.0, doc="[rad/s] on the spot")
-    turn_acceleration: float = bounded(3.0, low=0.05, high=50.0, doc="[rad/s^2]")
-    improvement_rounds: int = bounded(12, low=0, high=50, doc="searches after the first plan")
-    max_preemptive: int = bounded(
-        8, low=0, high=100, doc="pre-emptive pushes from whose ends a plan is looked for"
+    safety_distance: float = bounded(
+        0.012, low=0.0, high=1.0, doc="[m] clearance of robot and object to obstacles"
     )
-    seed: int = bounded(1, low=1, high=2**31, doc="of the RRT*")
+    standoff: float = bounded(
+        0.06,
+        low=0.005,
+        high=2.0,
+        doc="[m] distance behind the contact from which a robot approaches the object",
+    )
+    push_speed: float = bounded(0.07, low=0.005, high=2.0, doc="[m/s] speed of a push")
+    push_acceleration: float = bounded(
+        0.05, low=0.005, high=5.0, doc="[m/s^2] acceleration of a push"
+    )
+    move_speed: float = bounded(
+        0.1, low=0.005, high=2.0, doc="[m/s] speed of the robot without object"
+    )
+    move_acceleration: float = bounded(
+        0.15, low=0.005, high=5.0, doc="[m/s^2] acceleration of the robot without object"
+    )
+    turn_rate: float = bounded(1.5, low=0.05, high=10.0, doc="[rad/s] speed of turns in place")
+    turn_acceleration: float = bounded(
+        3.0, low=0.05, high=50.0, doc="[rad/s^2] acceleration of turns in place"
+    )
+    improvement_rounds: int = bounded(
+        12, low=0, high=50, doc="number of improvement searches after the first plan"
+    )
+    max_preemptive: int = bounded(
+        8, low=0, high=100, doc="maximum number of pre-emptive pushes that are tried"
+    )
+    seed: int = bounded(1, low=1, high=2**31, doc="seed of the RRT*")
 
     def __post_init__(self) -> None:
         if self.length_weight == 0.0 and self.clearance_weight == 0.0:
