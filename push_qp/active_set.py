@@ -31,7 +31,7 @@ class ActiveSetBackend:
     def solve(self, qp: Qp) -> QpSolution:
         """See QpBackend."""
         n = len(qp.f)
-        if self._shape != (n, *qp.bound.shape):  # what was remembered is of other rows
+        if self._shape != (n, *qp.bound.shape):  # the remembered working set belongs to other rows
             self._shape, self._count = (n, *qp.bound.shape), 0
             self._active, self._multiplier = np.zeros(n, np.int64), np.zeros(n)
         z = np.empty(n)

@@ -1,4 +1,4 @@
-"""What a bag holds, as time series: bodies, jobs of all teams, controllers, collisions."""
+"""The contents of a bag as time series: bodies, jobs of all teams, controllers, collisions."""
 
 from collections.abc import Container
 from dataclasses import dataclass, field
@@ -38,14 +38,14 @@ GROUP_STATUS = (
 )
 """Columns of a group's status, see push_msgs/GroupStatus."""
 
-_SPACING = 0.02  # [s] least, between frames that are kept
-_MOMENTS = 2.0  # [s] between messages of a swarm that are kept whole
+_SPACING = 0.02  # [s] shortest time between frames that are kept
+_MOMENTS = 2.0  # [s] between complete messages of a swarm that are kept
 _MOVING = (1, 2)  # modes MOVE and PUSH of ControllerStatus
 
 
 @dataclass(frozen=True)
 class State:
-    """Of a job, at a time [s]; code: of the last job that ended."""
+    """State of a job at a time [s]; code: of the last job that ended."""
 
     time: float
     name: str
@@ -70,8 +70,8 @@ class GroupPushes:
 
 @dataclass
 class SwarmTicks:
-    """What a swarm told: rows of time [s], position error [m], orientation error [rad], CPU [s] and
-    phase; and whole messages, push_msgs/SwarmStatus, every few seconds."""
+    """Status of a swarm: rows of time [s], position error [m], orientation error [rad], CPU [s] and
+    phase; and complete push_msgs/SwarmStatus messages every few seconds."""
 
     rows: list[tuple[float, float, float, float, str]] = field(default_factory=list)
     moments: list[Any] = field(default_factory=list)
@@ -79,8 +79,8 @@ class SwarmTicks:
 
 @dataclass
 class Job:
-    """What a team did. goal ``(3,)``: the last one; plan: ``(n, 2)`` [m] of each push's axle, or of
-    the object that a group pushes; pushes: of a group; swarm: of a swarm."""
+    """What a team did. goal ``(3,)``: the last one; plan: ``(n, 2)`` [m] path of the axle in each
+    push, or of the object that a group pushes; pushes: of a group; swarm: of a swarm."""
 
     space: str
     system: str = ""
@@ -95,7 +95,7 @@ class Job:
 
 @dataclass
 class BagContents:
-    """time ``(n,)`` [s]; poses ``(n, 3)`` by body, ground truth, nan where it is not told.
+    """time ``(n,)`` [s]; poses ``(n, 3)`` by body, ground truth, nan where unknown.
 
     status: by robot, by column of STATUS ``(k,)``; jobs: by the team's namespace.
     """
@@ -110,7 +110,7 @@ class BagContents:
 
 
 class _Suffixes(Container[str]):
-    """Topics by how their names end, whatever the namespace."""
+    """Topics by the end of their names, in any namespace."""
 
     def __init__(self, *suffixes: str) -> None:
         self._suffixes = tuple(f"/{s}" for s in suffixes)
@@ -124,7 +124,7 @@ def _seconds(stamp: Any) -> float:
 
 
 class _Frames:
-    """Frames of poses on their way into arrays."""
+    """Collects frames of poses into arrays."""
 
     def __init__(self, names: tuple[str, ...]) -> None:
         self._index = {name: i for i, name in enumerate(names)}
@@ -174,7 +174,7 @@ def bag_scenario(bag: Path) -> tuple[Scenario, dict[str, str]]:
 
 
 def load(bag: Path) -> BagContents:
-    """Read what a report shows.
+    """Read the data of a report.
 
     Raises
     ------
@@ -269,5 +269,5 @@ def _take_state(job: Job, message: Any) -> None:
     if message.goal.header.frame_id:
         try:
             job.goal = planar_pose(message.goal.pose, "the goal")
-        except InvalidMessage:  # what somebody recorded need not be right
+        except InvalidMessage:  # a recorded message need not be valid
             pass
