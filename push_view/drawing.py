@@ -1,4 +1,4 @@
-"""Pictures of a run with matplotlib: the map, bodies, ways, goals; for one body or a thousand."""
+"""Pictures of a run with matplotlib: map, bodies, paths, goals; for one body or a thousand."""
 
 import math
 from collections.abc import Iterable
@@ -17,10 +17,10 @@ from push_view.bodies import Bodies, bodies_of
 
 PLAN, GOAL, INK, FORCE = "#777777", "#c22f3d", "#222222", "#1b7837"
 
-_NAMED = 6  # bodies that have a name each in the legend
+_NAMED = 6  # number of bodies up to which each is named in the legend
 _FORCES_DRAWN = 2  # moments of a group's push whose forces are drawn
 _PER_NEWTON = 0.12  # [m]
-_WAY_POINTS = 2000  # of all that a way is drawn with
+_WAY_POINTS = 2000  # number of points with which a path is drawn
 
 
 def draw_map(axes: Axes, grid: OccupancyGrid) -> None:
@@ -47,7 +47,7 @@ def draw_body(axes: Axes, outline: Array, pose: Array, color: str, **style: Any)
 
 
 def body_vertices(bodies: Bodies, poses: dict[str, Array], moment: int) -> dict[str, list[Array]]:
-    """World outlines ``(n, 2)`` [m] of the bodies seen at a moment, by colour."""
+    """World outlines ``(n, 2)`` [m] of the bodies seen at one time, by colour."""
     result: dict[str, list[Array]] = {t.color: [] for t in bodies.types}
     for name, type_of in zip(bodies.names, bodies.type_of, strict=True):
         if name in poses and np.isfinite(poses[name][moment]).all():
@@ -65,7 +65,7 @@ def draw_bodies(axes: Axes, vertices: dict[str, list[Array]], **style: Any) -> N
 
 
 def draw_ways(axes: Axes, bodies: Bodies, poses: dict[str, Array]) -> None:
-    """Where all bodies went; each named in the legend when they are few, or else by kind."""
+    """Paths of all bodies; each is named in the legend if they are few, otherwise by kind."""
     few = len(poses) <= _NAMED
     named: set[str] = set()
     for kind in bodies.types:
@@ -91,7 +91,7 @@ def draw_ways(axes: Axes, bodies: Bodies, poses: dict[str, Array]) -> None:
 
 
 def moments(count: int, bodies: int) -> Array:
-    """Indices of the frames in which bodies are drawn: fewer, the more bodies there are."""
+    """Indices of the frames in which bodies are drawn; the more bodies, the fewer frames."""
     if count == 0:
         return np.zeros(0, dtype=int)
     snapshots = 7 if bodies <= _NAMED else 2 if bodies <= 50 else 1
@@ -135,7 +135,7 @@ def draw_forces(axes: Axes, push: GroupPushes) -> None:
 
 
 def draw_trajectory(axes: Axes, contents: BagContents, jobs: Iterable[Job] | None = None) -> None:
-    """Map, plans and goals of some teams or all, ways of all bodies, them and forces at moments."""
+    """Map, plans and goals of teams, paths of all bodies, bodies and forces at a few times."""
     bodies = bodies_of(contents.scenario)
     draw_map(axes, contents.scenario.grid)
     draw_jobs(axes, bodies, contents.jobs.values() if jobs is None else jobs)

@@ -80,14 +80,14 @@ export function poseOf(model, i) {
   return {x: p.x[i] * LENGTH, y: p.y[i] * LENGTH, theta: p.a[i] * ANGLE};
 }
 
-// Why no goal is taken for a team now; empty when it is. A paused suite takes goals.
+// Why a team accepts no goal now; empty if it does. A paused suite accepts goals.
 export function trouble(model, space, now) {
   if (model.heard === -Infinity) return "connecting to the viewer";
-  if (now - model.heard > LONGEST_SILENCE) return "the viewer is gone: it says nothing any more";
+  if (now - model.heard > LONGEST_SILENCE) return "the viewer does not respond any more";
   if (!model.suite) return "connecting to the viewer";
   if (model.suite.trouble) return model.suite.trouble;
-  if (!space) return "nobody takes goals yet";
-  return model.suite.teams[space] ?? "nobody takes goals yet";
+  if (!space) return "no node accepts goals yet";
+  return model.suite.teams[space] ?? "no node accepts goals yet";
 }
 
 // What became of a goal that this page sent, by its stamp: {kind, text}, or null.
@@ -97,6 +97,6 @@ export function answerTo(sent, team) {
   if (state.refusals > 0 && state.refused_stamp === sent.stamp) {
     return {kind: "refused", text: `the goal was refused: ${state.refusal}`};
   }
-  if (state.stamp === sent.stamp) return {kind: "taken", text: "the goal is taken"};
+  if (state.stamp === sent.stamp) return {kind: "taken", text: "the goal is accepted"};
   return {kind: "waiting", text: "the goal is sent"};
 }

@@ -1,7 +1,7 @@
-"""What the page and the report show of a job, a file a system: single, group, swarm.
+"""Panels of a job on the page and in the report, one file per system: single, group, swarm.
 
-A module of this package is the panel of the system that it is named after: its ``PANEL``. A system
-without one gets the state, the map and the log, which all have.
+The ``PANEL`` of a module of this package belongs to the system of that name. A system without a
+panel shows state, map and log, as all do.
 """
 
 import importlib
