@@ -1,9 +1,8 @@
-"""Paths of an object among obstacles, with room for robots all around it.
+"""The way of an object among obstacles that leaves its robots room all round it.
 
-A path consists of pieces with one constant twist each. Along such a piece the friction wrench is
-constant in the object's frame, so robots that can apply it at the beginning can apply it until the
-end. Between pieces robots change places, which costs more than a detour of some centimetres. Paths
-with few pieces are therefore preferred.
+Pieces of one twist each: along such a piece the wrench that the floor asks for is the same in the
+object's frame, so that robots which hold it at the beginning hold it to the end. Between pieces
+they change places, which costs more than a detour of some centimetres: few pieces are better.
 """
 
 import math
@@ -20,17 +19,17 @@ from push_model.free_space import FreeSpace, Obstacles
 from push_model.screws import screw_between, screw_poses
 
 _HEADINGS = 16
-_EVERY = 3  # spacings of the free space's lattice
-_OUTLINE = 0.03  # [m] between points of the outline that are checked
-_STEP = 0.02  # [m] between poses of a piece that are checked
-_TURN = 0.25  # [m] path length that a turn of one radian costs
-_SOON = 2  # steps within which an object moves away from what it touches
-_LEAST = 5e-3  # [m] least room, also where an object starts with less
-_TO_LATTICE = 40  # number of lattice poses to which start and goal are joined
+_EVERY = 3  # places of the free space's lattice
+_OUTLINE = 0.03  # [m] between points of the outline that are looked at
+_STEP = 0.02  # [m] between poses of a piece that are looked at
+_TURN = 0.25  # [m] of way that a radian costs
+_SOON = 2  # steps in which an object leaves what it touches
+_LEAST = 5e-3  # [m] of room that an object keeps even where it starts with less
+_TO_LATTICE = 40  # poses of the lattice to which start and goal are tried to join
 
 
 class NoObjectWay(Exception):
-    """Raised if no path has room for the robots."""
+    """Raised when there is no way with room for robots."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +41,7 @@ class ObjectWay:
 
 
 class WayFinder:
-    """Finds paths of one object that keep ``room`` [m] to everything."""
+    """Finds ways for one object, ``room`` [m] clear of everything."""
 
     def __init__(self, space: FreeSpace, outline: Array, room: float) -> None:
         """outline ``(m, 2)`` [m] about the object's centre of mass."""
@@ -62,13 +61,14 @@ class WayFinder:
         self._on_map: list[Array] = []  # clearance of the lattice's poses on the bare map, if known
 
     def with_room(self, room: float) -> "WayFinder":
-        """A finder for the same object with another room [m]; it shares the data of the map."""
+        """One for the same object that keeps so far [m] from everything; what is known of the map
+        is shared."""
         other = copy(self)
         other._room = room
         return other
 
     def clearance(self, poses: Array, among: Obstacles) -> Array:
-        """``(n,)`` [m] clearance of the outline at poses ``(n, 3)``."""
+        """``(n,)`` [m] of the outline at poses ``(n, 3)``."""
         poses = np.atleast_2d(poses)
         c, s = np.cos(poses[:, 2])[:, None], np.sin(poses[:, 2])[:, None]
         x, y = self._points.T
@@ -79,25 +79,24 @@ class WayFinder:
         return least
 
     def keeps(self, start: Array, motion: Array, among: Obstacles, leaves: bool = False) -> bool:
-        """Whether the object keeps its room on a piece, or gains room where it has less. leaves:
-        whether it may touch something at the start."""
+        """Whether the object keeps its room on a piece, or comes away where it has less. leaves:
+        whether it may touch something at the start, which it leaves."""
         length = float(np.hypot(*motion[:2])) + self._reach * abs(motion[2])
         parts = np.linspace(0.0, 1.0, max(2, math.ceil(length / _STEP) + 1))
         room = self.clearance(screw_poses(start, motion, parts), among)
         return self._enough(room, leaves)
 
     def _enough(self, room: Array, leaves: bool) -> bool:
-        """At an end with too little room, the room may only increase away from it."""
+        """Where an end has less room than is needed, it only becomes more on the way from it."""
         need = np.minimum(self._room, np.maximum.accumulate(room) - 1e-3)
         back = np.minimum(self._room, np.maximum.accumulate(room[::-1])[::-1] - 1e-3)
-        if (
-            leaves and room[0] < _LEAST
-        ):  # zero room may mean touching or overlapping: it must increase soon
+        if leaves and room[0] < _LEAST:  # no room tells touching from being within: it leaves soon
             room = room[_SOON:]
         return bool((room >= np.minimum(need, back)[-len(room) :]).all() and room.min() >= _LEAST)
 
     def way(self, start: Array, goal: Array, among: Obstacles) -> ObjectWay:
-        """A path between poses ``(3,)`` of the centre of mass; a goal heading of nan means any.
+        """From a pose ``(3,)`` to another, of the centre of mass; where the goal's heading is nan
+        with any heading.
 
         Raises
         ------
@@ -111,7 +110,7 @@ class WayFinder:
         return ObjectWay(start, self._few_pieces(poses, among))
 
     def _lattice_way(self, start: Array, goal: Array, among: Obstacles) -> Array:
-        """Poses ``(n, 3)`` from start to goal; all but the ends are neighbours on a lattice."""
+        """Poses ``(n, 3)`` from start to goal, side by side on a lattice but for the ends."""
         rows, columns = self._space.shape
         number = np.arange(rows * columns).reshape(rows, columns)[::_EVERY, ::_EVERY]
         places = self._space.places[number.ravel()]
@@ -153,7 +152,7 @@ class WayFinder:
         return found
 
     def _edges(self, shape: tuple[int, int]) -> tuple[Array, Array, Array]:
-        """Neighbours on the lattice of poses, and the costs [m] of steps to them."""
+        """Neighbours on the lattice of poses, and what a step between them costs [m]."""
         rows, columns = shape
         number = np.arange(_HEADINGS * rows * columns).reshape(_HEADINGS, rows, columns)
         spacing = _EVERY * float(self._space.places[1, 0] - self._space.places[0, 0])
@@ -174,7 +173,7 @@ class WayFinder:
     def _joined(
         self, end: Array, poses: Array, free: Mask, among: Obstacles, leaves: bool
     ) -> tuple[Array, Array]:
-        """Numbers of the lattice poses to which an end is joined by a piece, and the costs."""
+        """Numbers of poses of the lattice that an end has a piece to, and what that costs."""
         off = np.zeros(len(poses)) if math.isnan(end[2]) else poses[:, 2] - end[2]
         turn = np.abs(np.remainder(off + math.pi, 2.0 * math.pi) - math.pi)
         away = np.hypot(poses[:, 0] - end[0], poses[:, 1] - end[1]) + _TURN * turn
@@ -189,7 +188,7 @@ class WayFinder:
         return near, away[near]
 
     def _few_pieces(self, poses: Array, among: Obstacles) -> Array:
-        """Shorten a path: from each pose as far as a single piece leads."""
+        """From each pose as far along as one piece leads."""
         motions, k = [], 0
         while k < len(poses) - 1:
             ahead = len(poses) - 1
@@ -204,12 +203,12 @@ class WayFinder:
 
 
 def _headed(end: Array, pose: Array) -> Array:
-    """An end; if its heading does not matter, with the heading of a pose."""
+    """An end whose heading does not matter has that of a pose."""
     return np.array([*end[:2], pose[2]]) if math.isnan(end[2]) else end
 
 
 def pieces(way: ObjectWay) -> list[tuple[Array, Array]]:
-    """Start pose and motion of each piece."""
+    """Pose where each piece begins, and its motion."""
     found, pose = [], way.start
     for motion in way.motions:
         found.append((pose, motion))
