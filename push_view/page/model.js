@@ -1,4 +1,4 @@
-// What the page knows: it takes the server's events, one after the other.
+// The state of the page, updated by the events of the server.
 
 export const LONGEST_SILENCE = 800;   // [ms] without an event after which the server counts as gone
 const TRAIL_STEP = 0.004, TRAIL_LENGTH = 3000, TRAILED = 60;   // [m], points, bodies
@@ -68,7 +68,7 @@ function takeMembers(model, team) {
 
 export const KINDS = Object.keys(takers);
 
-// now: [ms] of a clock that never goes back
+// now: [ms] of a monotonic clock
 export function take(model, kind, data, now) {
   model.heard = now;
   takers[kind](model, data);
@@ -90,7 +90,7 @@ export function trouble(model, space, now) {
   return model.suite.teams[space] ?? "no node accepts goals yet";
 }
 
-// What became of a goal that this page sent, by its stamp: {kind, text}, or null.
+// The answer to a goal that this page sent, found by its stamp: {kind, text}, or null.
 export function answerTo(sent, team) {
   if (!sent || !team?.state) return sent ? {kind: "waiting", text: "the goal is sent"} : null;
   const state = team.state;

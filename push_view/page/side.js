@@ -1,4 +1,4 @@
-// The words and numbers beside the map.
+// The text and numbers beside the map.
 
 import {answerTo, poseOf} from "./model.js";
 import {teamColor} from "./scene.js";
@@ -12,7 +12,7 @@ function element(tag, text, style = "") {
   return made;
 }
 
-// Replace what is in an element, unless it is what is there: a choice stays open, a selection stays.
+// Replace the contents of an element only if they changed, so that menus and selections persist.
 function fill(id, key, make) {
   const text = JSON.stringify(key);
   if (SHOWN[id] === text) return;
