@@ -13,19 +13,19 @@ class SpeedDrive(DifferentialDrive):
     """Two wheels whose speed is controlled, as on an e-puck."""
 
     kind: Literal["differential"] = field(default="differential", kw_only=True)
-    wheel_radius: float = bounded(low=1e-3, high=1.0, doc="[m] radius of a wheel")
-    half_track: float = bounded(low=1e-3, high=1.0, doc="[m] half the distance between the wheels")
-    max_wheel_speed: float = bounded(low=1e-2, high=100.0, doc="[rad/s]")
-    wheel_mass: float = bounded(low=1e-4, high=50.0, doc="[kg] of one wheel")
-    wheel_torque: float = bounded(low=1e-4, high=100.0, doc="[Nm] greatest torque of a motor")
+    wheel_radius: float = bounded(low=1e-3, high=1.0, doc="Radius of a wheel (m)")
+    half_track: float = bounded(low=1e-3, high=1.0, doc="Half the distance between the wheels (m)")
+    max_wheel_speed: float = bounded(low=1e-2, high=100.0, doc="Greatest speed of a wheel (rad/s)")
+    wheel_mass: float = bounded(low=1e-4, high=50.0, doc="Mass of one wheel (kg)")
+    wheel_torque: float = bounded(low=1e-4, high=100.0, doc="Greatest torque of a motor (Nm)")
     wheel_inertia: float = bounded(
         0.0,
         low=0.0,
         high=100.0,
-        doc="[kg m^2] of a wheel with its geared motor; 0: of a solid ball",
+        doc="Inertia of a wheel with its geared motor (kg m^2); 0: that of a solid ball",
     )
     wheel_friction: float = bounded(
-        1.0, low=0.0, high=3.0, doc="friction coefficient of wheel and floor"
+        1.0, low=0.0, high=3.0, doc="Friction coefficient of wheel and floor"
     )
 
 
@@ -34,18 +34,18 @@ class TorqueDrive(DifferentialDrive):
     """Two wheels whose torque is controlled, as on the Pioneer of section 2.3."""
 
     kind: Literal["torque"] = field(default="torque", kw_only=True)
-    wheel_radius: float = bounded(low=1e-3, high=1.0, doc="[m] radius r of a wheel")
+    wheel_radius: float = bounded(low=1e-3, high=1.0, doc="Radius r of a wheel (m)")
     half_track: float = bounded(
-        low=1e-3, high=1.0, doc="[m] half the distance l between the wheels"
+        low=1e-3, high=1.0, doc="Half the distance l between the wheels (m)"
     )
-    max_wheel_speed: float = bounded(low=1e-2, high=100.0, doc="[rad/s]")
-    max_torque: float = bounded(low=1e-4, high=1000.0, doc="[Nm] greatest torque at one wheel")
-    wheel_mass: float = bounded(low=1e-4, high=50.0, doc="[kg] of one wheel")
+    max_wheel_speed: float = bounded(low=1e-2, high=100.0, doc="Greatest speed of a wheel (rad/s)")
+    max_torque: float = bounded(low=1e-4, high=1000.0, doc="Greatest torque at one wheel (Nm)")
+    wheel_mass: float = bounded(low=1e-4, high=50.0, doc="Mass of one wheel (kg)")
     wheel_inertia: float = bounded(
-        low=1e-9, high=100.0, doc="[kg m^2] I_w of a wheel about the axle"
+        low=1e-9, high=100.0, doc="Inertia I_w of a wheel about the axle (kg m^2)"
     )
     wheel_friction: float = bounded(
-        1.0, low=0.0, high=3.0, doc="friction coefficient mu of wheel and floor"
+        1.0, low=0.0, high=3.0, doc="Friction coefficient mu of wheel and floor"
     )
 
 
@@ -54,9 +54,9 @@ class HolonomicDrive:
     """Traction in any direction, as for a disc of a swarm."""
 
     kind: Literal["holonomic"] = field(default="holonomic", kw_only=True)
-    max_speed: float = bounded(low=1e-3, high=100.0, doc="[m/s] greatest speed in any direction")
-    max_turn_rate: float = bounded(low=1e-2, high=1000.0, doc="[rad/s] greatest turn rate")
-    max_force: float = bounded(low=1e-3, high=10000.0, doc="[N] greatest traction")
+    max_speed: float = bounded(low=1e-3, high=100.0, doc="Greatest speed in any direction (m/s)")
+    max_turn_rate: float = bounded(low=1e-2, high=1000.0, doc="Greatest turn rate (rad/s)")
+    max_force: float = bounded(low=1e-3, high=10000.0, doc="Greatest traction (N)")
 
     def saturate(self, vx: float, vy: float, omega: float) -> tuple[float, float, float]:
         """The feasible twist of the same direction and rotation centre: scaled by one factor."""

@@ -29,26 +29,26 @@ class RobotSpec:
 
     drive: Drive
     bumper: Bumper
-    body_radius: float = bounded(low=1e-3, high=2.0, doc="[m] radius of the body")
-    body_height: float = bounded(low=1e-3, high=2.0, doc="[m] height of the body")
-    mass: float = bounded(low=1e-3, high=500.0, doc="[kg] total mass")
+    body_radius: float = bounded(low=1e-3, high=2.0, doc="Radius of the body (m)")
+    body_height: float = bounded(low=1e-3, high=2.0, doc="Height of the body (m)")
+    mass: float = bounded(low=1e-3, high=500.0, doc="Total mass (kg)")
     com_ahead: float = bounded(
         0.0,
         low=-2.0,
         high=2.0,
-        doc="[m] position of the body's centre of mass, positive ahead of the axle",
+        doc="Position of the body's centre of mass, positive ahead of the axle (m)",
     )
     inertia: float | None = bounded(
         None,
         low=1e-9,
         high=1000.0,
-        doc="[kg m^2] I_r about the vertical axis through the centre of mass",
+        doc="Inertia I_r about the vertical axis through the centre of mass (kg m^2)",
     )
     casters: tuple[float, ...] | None = bounded(
-        None, low=-2.0, high=2.0, doc="[m] x of each caster, positive ahead of the axle"
+        None, low=-2.0, high=2.0, doc="Position of each caster, positive ahead of the axle (m)"
     )
     caster_clearance: float = bounded(
-        2e-4, low=0.0, high=0.1, doc="[m] height of the casters above the floor at rest"
+        2e-4, low=0.0, high=0.1, doc="Height of the casters above the floor at rest (m)"
     )
 
     def __post_init__(self) -> None:
@@ -148,25 +148,25 @@ class ObjectSpec:
     """
 
     shape: ShapeSpec
-    mass: float = bounded(low=1e-3, high=500.0, doc="[kg] mass of the object")
-    height: float = bounded(low=5e-3, high=2.0, doc="[m] height of the object")
+    mass: float = bounded(low=1e-3, high=500.0, doc="Mass of the object (kg)")
+    height: float = bounded(low=5e-3, high=2.0, doc="Height of the object (m)")
     floor_friction: float = bounded(
-        low=0.01, high=2.0, doc="friction coefficient of object and floor"
+        low=0.01, high=2.0, doc="Friction coefficient of object and floor"
     )
     contact_friction: float = bounded(
-        low=0.0, high=2.0, doc="friction coefficient of bumper and object"
+        low=0.0, high=2.0, doc="Friction coefficient of bumper and object"
     )
     feet: int = bounded(
-        4, low=3, high=16, doc="number of soft feet in simulation, see docs/physics.md"
+        4, low=3, high=16, doc="Number of soft feet in simulation, see docs/physics.md"
     )
     com: tuple[float, float] = bounded(
-        (0.0, 0.0), low=-100.0, high=100.0, doc="[m] centre of mass in the geometric frame"
+        (0.0, 0.0), low=-100.0, high=100.0, doc="Centre of mass in the geometric frame (m)"
     )
     inertia: float | None = bounded(
         None,
         low=1e-9,
         high=1e6,
-        doc="[kg m^2] about the centre of mass; default: that of uniform density",
+        doc="Inertia about the centre of mass (kg m^2); default: that of uniform density",
     )
 
     def __post_init__(self) -> None:
@@ -226,7 +226,7 @@ class CircleSpec:
     """A round obstacle."""
 
     centre: tuple[float, float]
-    radius: float = bounded(low=1e-3, high=100.0, doc="[m] radius of the obstacle")
+    radius: float = bounded(low=1e-3, high=100.0, doc="Radius of the obstacle (m)")
 
 
 @settings
@@ -244,10 +244,10 @@ class EnvironmentSpec:
     boxes: tuple[BoxSpec, ...] = ()
     circles: tuple[CircleSpec, ...] = ()
     polygons: tuple[PolygonSpec, ...] = ()
-    resolution: float = bounded(0.01, low=1e-3, high=0.5, doc="[m] cell size of the occupancy grid")
-    wall_height: float = bounded(0.1, low=0.01, high=5.0, doc="[m] height of the walls")
+    resolution: float = bounded(0.01, low=1e-3, high=0.5, doc="Cell size of the occupancy grid (m)")
+    wall_height: float = bounded(0.1, low=0.01, high=5.0, doc="Height of the walls (m)")
     wall_friction: float = bounded(
-        0.3, low=0.0, high=2.0, doc="friction coefficient of robot or object and wall"
+        0.3, low=0.0, high=2.0, doc="Friction coefficient of robot or object and wall"
     )
 
     def __post_init__(self) -> None:

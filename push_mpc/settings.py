@@ -9,7 +9,7 @@ from push_model.settings import SettingsError, bounded, settings
 class ControllerSettings:
     """Settings of the node itself."""
 
-    controller: str = bounded("ltv", doc="name of the predictive controller: ltv or contact_force")
+    controller: str = bounded("ltv", doc="Name of the predictive controller: ltv or contact_force")
 
 
 @settings
@@ -23,59 +23,61 @@ class MpcSettings:
     displace a robot by, and less than the 8 mm that the supervisor adds to the circles.
     """
 
-    step: float = bounded(0.1, low=0.01, high=1.0, doc="[s] length T_s of a predicted step")
-    horizon: int = bounded(20, low=2, high=100, doc="number p of predicted steps")
+    step: float = bounded(0.1, low=0.01, high=1.0, doc="Length T_s of a predicted step (s)")
+    horizon: int = bounded(20, low=2, high=100, doc="Number p of predicted steps")
     state_weight: tuple[float, float, float, float, float] = bounded(
         (40.0, 60.0, 1.0, 0.5, 0.02),
-        doc="diagonal of Q: weights of e_x, e_y, e_theta, e_v, e_omega",
+        doc="Diagonal of Q: weights of e_x, e_y, e_theta, e_v, e_omega",
     )
     terminal_factor: float = bounded(
-        5.0, low=0.0, high=1000.0, doc="factor of the terminal weight, P = factor * Q"
+        5.0, low=0.0, high=1000.0, doc="Factor of the terminal weight, P = factor * Q"
     )
     input_weight: tuple[float, float] = bounded(
-        (0.05, 0.002), doc="diagonal of R_u: weights of the two accelerations"
+        (0.05, 0.002), doc="Diagonal of R_u: weights of the two accelerations"
     )
     input_rate_weight: tuple[float, float] = bounded(
-        (0.05, 0.002), doc="diagonal of R_du: weights of the changes of the two accelerations"
+        (0.05, 0.002), doc="Diagonal of R_du: weights of the changes of the two accelerations"
     )
     max_acceleration: float = bounded(
-        0.3, low=0.01, high=20.0, doc="[m/s^2] limit of the linear acceleration"
+        0.3, low=0.01, high=20.0, doc="Limit of the linear acceleration (m/s^2)"
     )
     max_turn_acceleration: float = bounded(
-        6.0, low=0.01, high=200.0, doc="[rad/s^2] limit of the angular acceleration"
+        6.0, low=0.01, high=200.0, doc="Limit of the angular acceleration (rad/s^2)"
     )
     max_acceleration_change: float = bounded(
-        0.3, low=0.001, high=50.0, doc="[m/s^2] change of the linear acceleration per step"
+        0.3, low=0.001, high=50.0, doc="Change of the linear acceleration per step (m/s^2)"
     )
     max_turn_acceleration_change: float = bounded(
-        6.0, low=0.001, high=500.0, doc="[rad/s^2] change of the angular acceleration per step"
+        6.0, low=0.001, high=500.0, doc="Change of the angular acceleration per step (rad/s^2)"
     )
-    max_obstacles: int = bounded(20, low=0, high=200, doc="number of nearest obstacles in the QP")
+    max_obstacles: int = bounded(20, low=0, high=200, doc="Number of nearest obstacles in the QP")
     slack_linear: float = bounded(
-        1000.0, low=0.0, high=1e6, doc="linear penalty of violating a soft constraint"
+        1000.0, low=0.0, high=1e6, doc="Linear penalty of violating a soft constraint"
     )
     slack_quadratic: float = bounded(
-        20000.0, low=1e-3, high=1e8, doc="quadratic penalty of violating a soft constraint"
+        20000.0, low=1e-3, high=1e8, doc="Quadratic penalty of violating a soft constraint"
     )
     max_wheel_slack: float = bounded(
         0.01,
         low=1e-6,
         high=100.0,
-        doc="[m/s] by which a wheel may exceed its limit before the solve counts as failed",
+        doc="Speed by which a wheel may exceed its limit before the solve counts as failed (m/s)",
     )
     max_curvature_slack: float = bounded(
         0.02,
         low=1e-6,
         high=100.0,
-        doc="[rad/s] by which the turn rate may exceed the stable curvature before the solve fails",
+        doc="Turn rate beyond the stable curvature above which the solve counts as failed (rad/s)",
     )
     max_obstacle_slack: float = bounded(
         0.005,
         low=1e-6,
         high=100.0,
-        doc="[m] by which the robot may enter an obstacle's circle before the solve fails",
+        doc="Depth inside an obstacle's circle above which the solve counts as failed (m)",
     )
-    backend: Literal["active_set", "daqp", "osqp"] = bounded("active_set", doc="QP solver")
+    backend: Literal["active_set", "daqp", "osqp"] = bounded(
+        "active_set", doc="Solver of the quadratic programme"
+    )
 
     def __post_init__(self) -> None:
         if min(self.state_weight) < 0.0 or min(self.input_rate_weight) < 0.0:
@@ -88,9 +90,9 @@ class MpcSettings:
 class ContactForceSettings(MpcSettings):
     """Settings of the controller with contact forces, sections 2.4.5-2.4.6."""
 
-    force_weight: float = bounded(0.001, low=1e-6, high=1e3, doc="weight R_u of each contact force")
+    force_weight: float = bounded(0.001, low=1e-6, high=1e3, doc="Weight R_u of each contact force")
     constraint: bool = bounded(
-        True, doc="whether the pushing constraint (2.53) is active; false for comparison only"
+        True, doc="Whether the pushing constraint (2.53) is active; false for comparison only"
     )
 
 
@@ -99,94 +101,103 @@ class TrackerSettings:
     """When a trajectory is done, and when it has gone wrong."""
 
     tracked: Literal["object", "robot"] = bounded(
-        "object", doc="whether a push steers the object, or the robot as in the thesis"
+        "object", doc="Whether a push steers the object, or the robot as in the thesis"
     )
     friction_trust: float = bounded(
-        0.85, low=0.1, high=1.0, doc="fraction of the stable curvature that the controller may use"
+        0.85, low=0.1, high=1.0, doc="Fraction of the stable curvature that the controller may use"
     )
     pose_delay: float = bounded(
-        0.0, low=0.0, high=1.0, doc="[s] latency of the pose stream that is compensated"
+        0.0, low=0.0, high=1.0, doc="Latency of the pose stream that is compensated (s)"
     )
     give_up: float = bounded(
-        5.0, low=0.1, high=600.0, doc="[s] without poses after which a task fails"
+        5.0, low=0.1, high=600.0, doc="Time without poses after which a task fails (s)"
     )
     position_tolerance: float = bounded(
-        0.006, low=1e-4, high=1.0, doc="[m] position error allowed at the end of a trajectory"
+        0.006, low=1e-4, high=1.0, doc="Position error allowed at the end of a trajectory (m)"
     )
     orientation_tolerance: float = bounded(
-        0.03, low=1e-4, high=3.2, doc="[rad] heading error allowed at the end of a trajectory"
+        0.03, low=1e-4, high=3.2, doc="Heading error allowed at the end of a trajectory (rad)"
     )
     settle_time: float = bounded(
-        3.0, low=0.0, high=60.0, doc="[s] after the end of a trajectory to reach the tolerances"
+        3.0,
+        low=0.0,
+        high=60.0,
+        doc="Time after the end of a trajectory to reach the tolerances (s)",
     )
     grasp_filter: float = bounded(
         0.2,
         low=0.0,
         high=10.0,
-        doc="[s] time constant of the filter on the object's pose in the robot frame",
+        doc="Time constant of the filter on the object's pose in the robot frame (s)",
     )
     rest_speed: float = bounded(
-        0.01, low=1e-4, high=1.0, doc="[m/s] speed below which a robot counts as at rest"
+        0.01, low=1e-4, high=1.0, doc="Speed below which a robot counts as at rest (m/s)"
     )
     rest_turn_rate: float = bounded(
-        0.1, low=1e-3, high=10.0, doc="[rad/s] turn rate below which a robot counts as at rest"
+        0.1, low=1e-3, high=10.0, doc="Turn rate below which a robot counts as at rest (rad/s)"
     )
     lag_begin: float = bounded(
-        0.02, low=1e-3, high=1.0, doc="[m] lag of the robot at which the reference slows down"
+        0.02, low=1e-3, high=1.0, doc="Lag of the robot at which the reference slows down (m)"
     )
     lag_end: float = bounded(
-        0.06, low=2e-3, high=1.0, doc="[m] lag of the robot at which the reference stops"
+        0.06, low=2e-3, high=1.0, doc="Lag of the robot at which the reference stops (m)"
     )
     contact_gap: float = bounded(
-        0.015, low=1e-3, high=1.0, doc="[m] gap to the bumper above which contact is in doubt"
+        0.015, low=1e-3, high=1.0, doc="Gap to the bumper above which contact is in doubt (m)"
     )
     contact_aside: float = bounded(
         0.045,
         low=1e-3,
         high=1.0,
-        doc="[m] displacement along the bumper above which contact is in doubt",
+        doc="Displacement along the bumper above which contact is in doubt (m)",
     )
     contact_turn: float = bounded(
         0.25,
         low=0.01,
         high=3.2,
-        doc="[rad] rotation relative to the bumper above which contact is in doubt",
+        doc="Rotation relative to the bumper above which contact is in doubt (rad)",
     )
     contact_time: float = bounded(
-        0.5, low=0.0, high=10.0, doc="[s] in doubt after which contact counts as lost"
+        0.5, low=0.0, high=10.0, doc="Time in doubt after which contact counts as lost (s)"
     )
     off_course: float = bounded(
-        0.08, low=1e-3, high=5.0, doc="[m] distance from the reference at which a task fails"
+        0.08, low=1e-3, high=5.0, doc="Distance from the reference at which a task fails (m)"
     )
     deadline: float = bounded(
         0.0,
         low=0.0,
         high=10.0,
-        doc="[s] wall time that a solve may take in real time; 0 disables the check",
+        doc="Wall time that a solve may take in real time (s); 0 disables the check",
     )
     solver_patience: int = bounded(
         10,
         low=1,
         high=10000,
-        doc="number of failed or late solves in a row after which a task fails",
+        doc="Number of failed or late solves in a row after which a task fails",
     )
     fade_time: float = bounded(
         0.1,
         low=1e-3,
         high=10.0,
-        doc="[s] in which the last command fades to zero while solves are late",
+        doc="Time in which the last command fades to zero while solves are late (s)",
     )
     stuck_time: float = bounded(
-        1.5, low=0.1, high=60.0, doc="[s] of commanded motion over which being stuck is judged"
+        1.5,
+        low=0.1,
+        high=60.0,
+        doc="Time of commanded motion over which it is judged whether a robot is stuck (s)",
     )
     stuck_way: float = bounded(
-        0.03, low=1e-3, high=1.0, doc="[m] commanded within stuck_time above which it is judged"
+        0.03,
+        low=1e-3,
+        high=1.0,
+        doc="Distance commanded within stuck_time above which it is judged (m)",
     )
     blocked_time: float = bounded(
         4.0,
         low=0.1,
         high=600.0,
-        doc="[s] that the reference waits for a robot that lags behind before the task fails",
+        doc="Time that the reference waits for a robot that lags behind before a task fails (s)",
     )
 
     def __post_init__(self) -> None:

@@ -27,17 +27,17 @@ class BodyEntry:
     their kind changes.
     """
 
-    type: Any = bounded(doc="name of a type in config/, a path, or the type itself")
+    type: Any = bounded(doc="Name of a type in config/, a path, or the type itself")
     start: PoseValue | None = bounded(
-        None, doc="start pose [x, y, theta] [m, m, rad] in the world frame"
+        None, doc="Start pose [x, y, theta] [m, m, rad] in the world frame"
     )
     count: int | None = bounded(
         None,
         low=1,
         high=10000,
-        doc="number of bodies of a group; they are called name1, name2, ...",
+        doc="Number of bodies of a group; they are called name1, name2, ...",
     )
-    placement: Placement | None = bounded(None, doc="where the bodies of a group start")
+    placement: Placement | None = bounded(None, doc="Where the bodies of a group start")
 
     def __post_init__(self) -> None:
         if self.start is None and self.count is None and self.placement is None:

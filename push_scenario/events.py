@@ -16,9 +16,11 @@ class Displace:
     is in its way."""
 
     kind: Literal["displace"] = field(default="displace", kw_only=True)
-    at: float = bounded(low=0.0, high=_LATEST, doc="[s] simulation time of the event")
-    body: str = bounded(doc="name of an object or a robot")
-    by: PoseValue = bounded(doc="dx, dy, dtheta [m, m, rad] along the axes of the world frame")
+    at: float = bounded(low=0.0, high=_LATEST, doc="Simulation time of the event (s)")
+    body: str = bounded(doc="Name of an object or a robot")
+    by: PoseValue = bounded(
+        doc="Displacement dx, dy, dtheta [m, m, rad] along the axes of the world frame"
+    )
 
 
 @settings
@@ -26,9 +28,9 @@ class Place:
     """An object or a robot is put somewhere instantly, at rest, unless something is there."""
 
     kind: Literal["place"] = field(default="place", kw_only=True)
-    at: float = bounded(low=0.0, high=_LATEST, doc="[s] simulation time of the event")
-    body: str = bounded(doc="name of an object or a robot")
-    pose: PoseValue = bounded(doc="x, y, theta [m, m, rad] in the world frame")
+    at: float = bounded(low=0.0, high=_LATEST, doc="Simulation time of the event (s)")
+    body: str = bounded(doc="Name of an object or a robot")
+    pose: PoseValue = bounded(doc="Pose x, y, theta [m, m, rad] in the world frame")
 
 
 @settings
@@ -36,8 +38,8 @@ class Kill:
     """A robot ignores all commands from now on and does not move."""
 
     kind: Literal["kill"] = field(default="kill", kw_only=True)
-    at: float = bounded(low=0.0, high=_LATEST, doc="[s] simulation time of the event")
-    robot: str = bounded(doc="name of the robot")
+    at: float = bounded(low=0.0, high=_LATEST, doc="Simulation time of the event (s)")
+    robot: str = bounded(doc="Name of the robot")
 
 
 @settings
@@ -45,8 +47,8 @@ class Remove:
     """A robot is removed from the world and from motion capture."""
 
     kind: Literal["remove"] = field(default="remove", kw_only=True)
-    at: float = bounded(low=0.0, high=_LATEST, doc="[s] simulation time of the event")
-    robot: str = bounded(doc="name of the robot")
+    at: float = bounded(low=0.0, high=_LATEST, doc="Simulation time of the event (s)")
+    robot: str = bounded(doc="Name of the robot")
 
 
 @settings
@@ -54,9 +56,11 @@ class DropPoses:
     """Motion capture does not see some bodies for a while."""
 
     kind: Literal["drop_poses"] = field(default="drop_poses", kw_only=True)
-    at: float = bounded(low=0.0, high=_LATEST, doc="[s] simulation time of the event")
-    bodies: tuple[str, ...] = bounded(doc="names of objects and robots")
-    duration: float = bounded(low=0.0, high=_LATEST, doc="[s] for which they are not seen")
+    at: float = bounded(low=0.0, high=_LATEST, doc="Simulation time of the event (s)")
+    bodies: tuple[str, ...] = bounded(doc="Names of objects and robots")
+    duration: float = bounded(
+        low=0.0, high=_LATEST, doc="Duration for which the bodies are not seen (s)"
+    )
 
 
 Event = Displace | Place | Kill | Remove | DropPoses

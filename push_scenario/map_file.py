@@ -31,24 +31,24 @@ class MapFile:
     """The keys of map_server, and the walls in simulation."""
 
     image: str
-    resolution: float = bounded(low=1e-3, high=0.5, doc="[m] size of a cell")
+    resolution: float = bounded(low=1e-3, high=0.5, doc="Size of a cell (m)")
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     negate: int = bounded(
         0, low=0, high=1, doc="1 if white pixels are occupied, 0 if black ones are"
     )
     occupied_thresh: float = bounded(
-        0.65, low=0.0, high=1.0, doc="occupancy above which a cell is occupied"
+        0.65, low=0.0, high=1.0, doc="Occupancy above which a cell is occupied"
     )
     free_thresh: float = bounded(
         0.196,
         low=0.0,
         high=1.0,
-        doc="occupancy below which a cell is free; grey 205 is unknown in any case",
+        doc="Occupancy below which a cell is free; grey 205 is unknown in any case",
     )
     mode: Literal["trinary", "scale", "raw"] = "trinary"
-    wall_height: float = bounded(0.1, low=0.01, high=5.0, doc="[m] height of the walls")
+    wall_height: float = bounded(0.1, low=0.01, high=5.0, doc="Height of the walls (m)")
     wall_friction: float = bounded(
-        0.3, low=0.0, high=2.0, doc="friction coefficient of robot or object and wall"
+        0.3, low=0.0, high=2.0, doc="Friction coefficient of robot or object and wall"
     )
 
     def __post_init__(self) -> None:

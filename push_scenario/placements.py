@@ -20,12 +20,12 @@ class GridPlacement:
     """In rows, from the lowest upward."""
 
     kind: Literal["grid"] = field(default="grid", kw_only=True)
-    corner: tuple[float, float] = bounded(low=-1e4, high=1e4, doc="[m] position of the first body")
-    spacing: float = bounded(low=1e-3, high=100.0, doc="[m] distance between neighbours")
+    corner: tuple[float, float] = bounded(low=-1e4, high=1e4, doc="Position of the first body (m)")
+    spacing: float = bounded(low=1e-3, high=100.0, doc="Distance between neighbours (m)")
     columns: int | None = bounded(
-        None, low=1, high=10000, doc="bodies in a row; default: a square grid"
+        None, low=1, high=10000, doc="Bodies in a row; default: a square grid"
     )
-    heading: float = bounded(0.0, low=-10.0, high=10.0, doc="[rad] heading of all bodies")
+    heading: float = bounded(0.0, low=-10.0, high=10.0, doc="Heading of all bodies (rad)")
 
     def poses(self, count: int, radius: float, room: Room, taken: Array) -> Array:
         """``(count, 3)`` poses; see ``RandomPlacement.poses``."""
@@ -42,11 +42,11 @@ class RingPlacement:
     """Evenly on a circle, counter-clockwise."""
 
     kind: Literal["ring"] = field(default="ring", kw_only=True)
-    centre: tuple[float, float] = bounded(low=-1e4, high=1e4, doc="[m] centre of the ring")
-    radius: float = bounded(low=1e-3, high=1000.0, doc="[m] radius of the ring")
-    first: float = bounded(0.0, low=-10.0, high=10.0, doc="[rad] polar angle of the first body")
+    centre: tuple[float, float] = bounded(low=-1e4, high=1e4, doc="Centre of the ring (m)")
+    radius: float = bounded(low=1e-3, high=1000.0, doc="Radius of the ring (m)")
+    first: float = bounded(0.0, low=-10.0, high=10.0, doc="Polar angle of the first body (rad)")
     facing: Literal["inward", "outward", "along"] = bounded(
-        "inward", doc="direction in which the bodies face"
+        "inward", doc="Direction in which the bodies face"
     )
 
     def poses(self, count: int, radius: float, room: Room, taken: Array) -> Array:
@@ -69,13 +69,16 @@ class RandomPlacement:
 
     kind: Literal["random"] = field(default="random", kw_only=True)
     area: tuple[float, float, float, float] | None = bounded(
-        None, low=-1e4, high=1e4, doc="[m] x_min, x_max, y_min, y_max; default: the whole arena"
+        None,
+        low=-1e4,
+        high=1e4,
+        doc="Rectangle x_min, x_max, y_min, y_max (m); default: the whole arena",
     )
-    gap: float = bounded(0.01, low=0.0, high=10.0, doc="[m] least distance to anything else")
+    gap: float = bounded(0.01, low=0.0, high=10.0, doc="Least distance to anything else (m)")
     heading: float | None = bounded(
-        None, low=-10.0, high=10.0, doc="[rad] heading of all bodies; default: random"
+        None, low=-10.0, high=10.0, doc="Heading of all bodies (rad); default: random"
     )
-    seed: int = bounded(1, low=0, high=2**62, doc="equal seeds give equal poses")
+    seed: int = bounded(1, low=0, high=2**62, doc="Seed; equal seeds give equal poses")
 
     def __post_init__(self) -> None:
         if self.area is not None and not (

@@ -69,14 +69,14 @@ NODES = (
 class ScenarioFile:
     """The keys of a scenario file."""
 
-    environment: Any = bounded(doc="a name in config/environments, a path, or the contents")
-    robots: dict[str, Any] = bounded(doc="name to type and start, or to type, count and placement")
+    environment: Any = bounded(doc="A name in config/environments, a path, or the contents")
+    robots: dict[str, Any] = bounded(doc="Name to type and start, or to type, count and placement")
     objects: dict[str, Any] = field(default_factory=dict)
-    goal: PoseValue | None = bounded(None, doc="[x, y, theta] [m, m, rad] goal of the first object")
-    goals: tuple[PoseValue, ...] = bounded((), doc="several goals, reached one after another")
-    trajectory: tuple[TimedPose, ...] = bounded((), doc="timed poses instead of goals")
+    goal: PoseValue | None = bounded(None, doc="Goal [x, y, theta] [m, m, rad] of the first object")
+    goals: tuple[PoseValue, ...] = bounded((), doc="Several goals, reached one after another")
+    trajectory: tuple[TimedPose, ...] = bounded((), doc="Timed poses instead of goals")
     teams: dict[str, TeamEntry] = field(default_factory=dict)
-    events: tuple[Event, ...] = bounded((), doc="events while the scenario runs")
+    events: tuple[Event, ...] = bounded((), doc="Events while the scenario runs")
     parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -12,21 +12,21 @@ from push_scenario.poses import PoseValue, to_array, to_value
 class TimedPose:
     """A pose of a trajectory."""
 
-    at: float = bounded(low=0.0, high=1e6, doc="[s] after the trajectory begins")
-    pose: PoseValue = bounded(doc="[x, y, theta] [m, m, rad] in the world frame")
+    at: float = bounded(low=0.0, high=1e6, doc="Time after the trajectory begins (s)")
+    pose: PoseValue = bounded(doc="Pose [x, y, theta] [m, m, rad] in the world frame")
 
 
 @settings
 class TeamEntry:
     """A team in a scenario file."""
 
-    robots: tuple[str, ...] = bounded(doc="names of robots or of groups of robots")
+    robots: tuple[str, ...] = bounded(doc="Names of robots or of groups of robots")
     object: str = bounded(
-        "", doc="the object of the team; may be left out if the scenario has only one"
+        "", doc="The object of the team; may be left out if the scenario has only one"
     )
-    goal: PoseValue | None = bounded(None, doc="[x, y, theta] [m, m, rad] goal of the object")
-    goals: tuple[PoseValue, ...] = bounded((), doc="several goals, reached one after another")
-    trajectory: tuple[TimedPose, ...] = bounded((), doc="timed poses of the object")
+    goal: PoseValue | None = bounded(None, doc="Goal [x, y, theta] [m, m, rad] of the object")
+    goals: tuple[PoseValue, ...] = bounded((), doc="Several goals, reached one after another")
+    trajectory: tuple[TimedPose, ...] = bounded((), doc="Timed poses of the object")
 
     def __post_init__(self) -> None:
         check_aims(self.goal, self.goals, self.trajectory)

@@ -1,5 +1,6 @@
 """The pages of docs against the code: error codes have their rows, and links lead somewhere."""
 
+import ast
 import importlib
 import re
 from enum import IntEnum
@@ -123,3 +124,25 @@ def test_defaults_that_a_page_tells_are_those_of_the_settings(page):
         else:
             number, _, unit = told.partition(" ")
             assert float(number) * (1e-3 if unit == "mm" else 1.0) == pytest.approx(value), name
+
+
+PLAIN = (
+    "push_planner/settings.py",
+    "push_mpc/settings.py",
+    "push_model/*.py",
+    "push_scenario/*.py",
+)
+
+
+@pytest.mark.parametrize(
+    "path", sorted(p for g in PLAIN for p in ROOT.glob(g)), ids=lambda p: p.stem
+)
+def test_the_text_of_a_parameter_stands_alone(path):
+    """As ``ros2 param describe`` shows it: a phrase of its own, that does not lean on another."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.keyword) and node.arg == "doc":
+            text = ast.literal_eval(node.value)
+            assert len(text.split()) >= 2 and not text[0].islower(), text
+            assert not re.search(r"likewise|meanwhile|^Of |^By |^At |^\(|that it |whoever", text), (
+                text
+            )
