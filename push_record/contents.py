@@ -1,4 +1,4 @@
-"""What a bag holds, as time series: bodies, jobs of all teams, controllers, collisions."""
+"""The contents of a bag as time series: bodies, jobs of all teams, controllers, collisions."""
 
 from collections.abc import Container
 from dataclasses import dataclass, field
@@ -34,7 +34,7 @@ _MOVING = (1, 2)  # modes MOVE and PUSH of ControllerStatus
 
 @dataclass(frozen=True)
 class State:
-    """Of a job, at a time [s]; code: of the last job that ended."""
+    """State of a job at a time [s]; code: of the last job that ended."""
 
     time: float
     name: str
@@ -85,7 +85,7 @@ class Job:
 
 @dataclass
 class BagContents:
-    """time ``(n,)`` [s]; poses ``(n, 3)`` by body, ground truth, nan where it is not told.
+    """time ``(n,)`` [s]; poses ``(n, 3)`` by body, ground truth, nan where unknown.
 
     status: by robot, by column of STATUS ``(k,)``; jobs: by the team's namespace.
     """
@@ -100,7 +100,7 @@ class BagContents:
 
 
 class _Suffixes(Container[str]):
-    """Topics by how their names end, whatever the namespace."""
+    """Topics by the end of their names, in any namespace."""
 
     def __init__(self, *suffixes: str) -> None:
         self._suffixes = tuple(f"/{s}" for s in suffixes)
@@ -114,7 +114,7 @@ def _seconds(stamp: Any) -> float:
 
 
 class _Frames:
-    """Frames of poses on their way into arrays."""
+    """Collects frames of poses into arrays."""
 
     def __init__(self, names: tuple[str, ...]) -> None:
         self._index = {name: i for i, name in enumerate(names)}
@@ -164,7 +164,7 @@ def bag_scenario(bag: Path) -> tuple[Scenario, dict[str, str]]:
 
 
 def load(bag: Path) -> BagContents:
-    """Read what a report shows.
+    """Read the data of a report.
 
     Raises
     ------
@@ -240,5 +240,5 @@ def _take_state(job: Job, message: Any) -> None:
     if message.goal.header.frame_id:
         try:
             job.goal = planar_pose(message.goal.pose, "the goal")
-        except InvalidMessage:  # what somebody recorded need not be right
+        except InvalidMessage:  # a recorded message need not be valid
             pass

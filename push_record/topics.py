@@ -1,4 +1,4 @@
-"""What is recorded of a scenario, and played: topics of the world, of each robot, of each team."""
+"""Topics that are recorded and played: of the world, of each robot, of each team."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -32,7 +32,7 @@ from tf2_msgs.msg import TFMessage
 
 @dataclass(frozen=True)
 class Topic:
-    """message: class. qos: of its publisher, which a subscriber takes too."""
+    """message: class. qos: of its publisher, used by subscribers too."""
 
     message: Any
     qos: Any
@@ -87,18 +87,18 @@ TORQUE_ROBOT = {
     "wheel_torques": Topic(WheelTorques, COMMAND),
     "joint_states": Topic(JointState, STREAM),
 }
-"""Further, in the namespace of each robot whose wheels are driven by torque."""
+"""Additional topics of each robot whose wheels are driven by torque."""
 
 MANY = 50
-"""Robots of a world from which on they are commanded by ``cmd_vels``, and nothing of a single one
-is recorded: some subscriptions a robot would cost too much."""
+"""Number of robots from which on they are commanded by ``cmd_vels``. Topics of single robots are
+then not recorded, because a few subscriptions per robot would cost too much."""
 
 SHOWN = ("clock", "poses", "map", "scenario", "paused", "belief", "tf", "visualization")
 """Of the world's: what a playback shows. Commands and ground truth are not published again."""
 
 
 def team_names(scenario: Scenario, namespace: str = "") -> dict[str, Names]:
-    """The names of each team; of the unnamed one where the scenario names none."""
+    """The names of the teams; one unnamed team if the scenario has none."""
     world = space(namespace)
     teams = list(scenario.teams) or [""]
     return {t: Names(world, space(inside(namespace, t)) if t else world) for t in teams}

@@ -56,20 +56,20 @@ __all__ = [
 class ScenarioFile:
     """The keys of a scenario file."""
 
-    environment: Any = bounded(doc="a name in config/environments, a path, or the contents")
-    robots: dict[str, Any] = bounded(doc="name to type and start, or type, count and placement")
+    environment: Any = bounded(doc="A name in config/environments, a path, or the contents")
+    robots: dict[str, Any] = bounded(doc="Name to type and start, or to type, count and placement")
     objects: dict[str, Any] = field(default_factory=dict)
-    goal: PoseValue | None = bounded(None, doc="[x, y, theta] [m, m, rad] of the first object")
-    goals: tuple[PoseValue, ...] = bounded((), doc="several goals, one after another")
-    trajectory: tuple[TimedPose, ...] = bounded((), doc="timed poses instead of goals")
+    goal: PoseValue | None = bounded(None, doc="Goal [x, y, theta] [m, m, rad] of the first object")
+    goals: tuple[PoseValue, ...] = bounded((), doc="Several goals, reached one after another")
+    trajectory: tuple[TimedPose, ...] = bounded((), doc="Timed poses instead of goals")
     teams: dict[str, TeamEntry] = field(default_factory=dict)
-    events: tuple[Event, ...] = bounded((), doc="what happens while it runs")
+    events: tuple[Event, ...] = bounded((), doc="Events while the scenario runs")
     parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         check_aims(self.goal, self.goals, self.trajectory)
         if self.teams and (self.goal is not None or self.goals or self.trajectory):
-            raise SettingsError("with teams, each has its goals; the scenario has none of its own")
+            raise SettingsError("with teams, goals belong to the teams, not to the scenario")
         if not self.robots:
             raise SettingsError("robots: at least one robot is needed")
 
@@ -101,7 +101,7 @@ class Scenario:
 
     @property
     def text(self) -> str:
-        """The scenario as YAML that needs no other file, every default written out."""
+        """The scenario as YAML with every default written out; it needs no other file."""
         values: dict[str, Any] = {
             "environment": map_to_mapping(self.environment)
             if isinstance(self.environment, MapSpec)

@@ -1,4 +1,4 @@
-"""Pictures of a run with matplotlib: the map, bodies, ways, goals; for one body or a thousand."""
+"""Pictures of a run with matplotlib: map, bodies, paths, goals; for one body or a thousand."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -44,7 +44,7 @@ def draw_body(axes: Axes, outline: Array, pose: Array, color: str, **style: Any)
 
 
 def body_vertices(bodies: Bodies, poses: dict[str, Array], moment: int) -> dict[str, list[Array]]:
-    """World outlines ``(n, 2)`` [m] of the bodies seen at a moment, by colour."""
+    """World outlines ``(n, 2)`` [m] of the bodies seen at one time, by colour."""
     result: dict[str, list[Array]] = {t.color: [] for t in bodies.types}
     for name, type_of in zip(bodies.names, bodies.type_of, strict=True):
         if name in poses and np.isfinite(poses[name][moment]).all():
@@ -62,7 +62,7 @@ def draw_bodies(axes: Axes, vertices: dict[str, list[Array]], **style: Any) -> N
 
 
 def draw_ways(axes: Axes, bodies: Bodies, poses: dict[str, Array]) -> None:
-    """Where all bodies went; each named in the legend when they are few, or else by kind."""
+    """Paths of all bodies; each is named in the legend if they are few, otherwise by kind."""
     few = len(poses) <= _NAMED
     named: set[str] = set()
     for kind in bodies.types:
@@ -88,7 +88,7 @@ def draw_ways(axes: Axes, bodies: Bodies, poses: dict[str, Array]) -> None:
 
 
 def moments(count: int, bodies: int) -> Array:
-    """Indices of the frames in which bodies are drawn: fewer, the more bodies there are."""
+    """Indices of the frames in which bodies are drawn; the more bodies, the fewer frames."""
     if count == 0:
         return np.zeros(0, dtype=int)
     snapshots = 7 if bodies <= _NAMED else 2 if bodies <= 50 else 1

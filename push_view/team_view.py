@@ -1,4 +1,4 @@
-"""A team as the viewer sees it: its job, its plan, its panel; and what it is asked for."""
+"""A team in the viewer: its job, plan and panel, and the requests to it."""
 
 import contextlib
 import math
@@ -25,7 +25,7 @@ _POINTS = 400  # of a path that are sent to a page
 
 
 def stamp_text(message: PoseStamped) -> str:
-    """By which a goal is known again."""
+    """Key by which a goal is recognised."""
     return f"{message.header.stamp.sec}.{message.header.stamp.nanosec:09d}"
 
 
@@ -47,7 +47,7 @@ class TeamView:
         ]
 
     def close(self) -> None:
-        """Leave the graph and the pages."""
+        """Remove the team from the graph and from the pages."""
         for subscription in self._subscriptions:
             self._node.destroy_subscription(subscription)
         self._node.destroy_publisher(self._goals)
@@ -58,7 +58,7 @@ class TeamView:
             self._board.drop(f"{kind} {self.space}")
 
     def look(self) -> None:
-        """See in the graph whether somebody takes goals."""
+        """Check in the graph whether a node accepts goals."""
         self.hears = heard(self._node, self._goals)
 
     def show_panel(self) -> None:
@@ -78,7 +78,7 @@ class TeamView:
         self._goals.publish(message)
 
     def cancel(self) -> None:
-        """Ask for the end of the job."""
+        """Ask to cancel the job."""
         self._cancel.call_async(Trigger.Request())
 
     def _put(self, kind: str, **data: Any) -> None:

@@ -1,5 +1,5 @@
-// Draws a model on a canvas: map, plans, trails, bodies, goals. Where bodies are many, those that look
-// alike are drawn once, as a picture that is then put where each of them is.
+// Draws a model on a canvas: map, plans, trails, bodies, goals. If there are many bodies, those that
+// look alike are drawn once, as a picture that is then copied to each of them.
 
 import {poseOf} from "./model.js";
 
@@ -10,7 +10,7 @@ const EMPTY = [-1.5, 1.5, -1, 1];
 
 export const teamColor = number => TEAMS[number % TEAMS.length];
 
-// Metres to pixels of the canvas, the map fitted into it.
+// Conversion of metres to pixels of the canvas, into which the map is fitted.
 export function fitted(extent, width, height) {
   const [x0, x1, y0, y1] = extent ?? EMPTY;
   const scale = 0.96 * Math.min(width / (x1 - x0), height / (y1 - y0));
@@ -19,7 +19,7 @@ export function fitted(extent, width, height) {
 export const toPixels = (f, x, y) => [f.ox + f.scale * x, f.oy - f.scale * y];
 export const toMetres = (f, u, v) => ({x: (u - f.ox) / f.scale, y: (f.oy - v) / f.scale});
 
-// So many vertices as can be told apart when the outline is drawn with a scale [pixels/m].
+// As many vertices as are visible when the outline is drawn with a scale [pixels/m].
 export function thinned(outline, scale) {
   const reach = scale * Math.max(...outline.map(p => Math.hypot(...p)));
   const most = Math.max(8, Math.ceil(4 * Math.sqrt(reach)) * 2);
@@ -32,7 +32,7 @@ export class Scene {
 
   frame(model) { return fitted(model.map?.extent, this.canvas.width, this.canvas.height); }
 
-  // Where a pointer event is, in metres and in CSS pixels.
+  // Position of a pointer event, in metres and in CSS pixels.
   place(model, event) {
     const box = this.canvas.getBoundingClientRect(), ratio = this.canvas.width / box.width;
     const pixel = {x: event.clientX - box.left, y: event.clientY - box.top};
@@ -124,7 +124,7 @@ export class Scene {
     }
   }
 
-  // An outline with a heading of 0, in the middle of a canvas of its own.
+  // An outline with heading 0, in the middle of its own canvas.
   picture(f, outline, color, of) {
     const key = `${of} ${color} ${f.scale} ${this.ratio}`;
     if (!this.pictures.has(key)) {

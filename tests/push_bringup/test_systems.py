@@ -134,7 +134,7 @@ def test_what_the_processes_read_is_what_was_checked(tmp_path):
 def test_a_bag_that_cannot_be_written_is_refused(tmp_path):
     check_bag(tmp_path / "new" / "bag")
     (tmp_path / "bag").mkdir()
-    with pytest.raises(FileExistsError, match="bag is there already"):
+    with pytest.raises(FileExistsError, match="bag exists already"):
         prepare("short", record=tmp_path / "bag")
     (tmp_path / "file").write_text("")
     with pytest.raises(SettingsError, match="cannot be written"):
