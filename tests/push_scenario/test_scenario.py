@@ -59,7 +59,6 @@ def test_every_shipped_type_is_sound(kind, cls):
         ({"objects": {"r": {"type": "box9", "start": [0, 0, 0]}}}, ["both a robot and an object"]),
         ({"goal": [0, 0, "a"]}, ["goal", "[x, y, theta]"]),
         ({"parameters": {"planner": 3}}, ["parameters"]),
-        ({"parameters": {"planer": {}}}, ["parameters", "unknown node 'planer'", "planner"]),
         ({"robots": {"r": {"type": "epuck"}}}, ["robots.r", "'start'", "'placement'"]),
         ({"robots": {"r": {"type": "epuck", "count": 3}}}, ["robots.r", "'placement'"]),
         ({"goal": [0, 0, math.inf]}, ["goal", "[x, y, theta]", "inf"]),

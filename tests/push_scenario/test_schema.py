@@ -111,7 +111,7 @@ SCENARIO = {
         (["teams", "t", "trajectory"], [{"at": -1, "pose": [0, 0, 0]}]),
         (["events", 0, "kind"], "quake"),
         (["events", 0, "robot"], "r"),
-        (["parameters", "planer"], {}),
+        (["parameters", "planner"], 3),
         (["robot"], {}),
     ],
 )

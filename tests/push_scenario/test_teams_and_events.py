@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from push_model import SettingsError
 from push_scenario.events import Displace, DropPoses, Kill, Place, Remove
 from push_scenario.scenario import (
-    NODES,
     Scenario,
     load_scenario,
     scenario_from_mapping,
@@ -203,7 +202,7 @@ aims = st.one_of(
     st.integers(1, 12),
     st.floats(0.01, 5.0),
     st.dictionaries(
-        st.sampled_from(NODES),
+        st.sampled_from(("bridge", "planner", "swarm", "package.module:METHOD")),
         st.dictionaries(
             st.text("abc_", min_size=1, max_size=4),
             st.none()

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PIL import Image
-from push_view.panels import panel_of
 from rclpy.serialization import serialize_message
 
 from push_model.specs import EnvironmentSpec
@@ -241,8 +240,3 @@ def test_bodies_are_drawn_at_fewer_moments_the_more_they_are(count, bodies):
     found = moments(count, bodies)
     assert len(found) == len(set(found)) <= (7 if bodies == 2 else 2)
     assert count == 0 or found[-1] == count - 1
-
-
-def test_a_system_without_a_panel_has_none():
-    assert panel_of("single") is not None
-    assert all(panel_of(name) is None for name in ("", "juggling", "os", "../report"))

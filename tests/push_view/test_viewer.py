@@ -8,10 +8,13 @@ import pytest
 from nav_msgs.msg import Path
 from std_msgs.msg import Bool, String
 
-from push_msgs.msg import ControllerStatus, JobState
+from push_job.report import Figure, polyline
+from push_job.report import Report as Report_
+from push_msgs.msg import JobState, Report
 from push_ros.conversions import grid_to_ros, path_to_ros, pose_stamped_to_ros
 from push_ros.process import Spinner
 from push_ros.qos import LATCHED, STATUS
+from push_ros.report_conversions import report_to_ros
 from push_view.suite_watch import SILENCE
 from tests.push_view.page_client import Page, Suite
 
@@ -100,21 +103,22 @@ def test_events_carry_poses_and_states_and_nothing_that_is_not_json(page):
 
 def test_the_panel_of_a_single_robot_and_the_plan(page):
     page.suite.states["/"].publish(JobState(system="single", robots=["epuck1"], object="box"))
-    statuses = page.suite.node.create_publisher(
-        ControllerStatus, "/epuck1/controller/status", STATUS
-    )
+    reports = page.suite.node.create_publisher(Report, "/epuck1/report", STATUS)
     paths = page.suite.node.create_publisher(Path, "/push_path", LATCHED)
-    assert page.until(lambda: statuses.get_subscription_count() > 0)
-    statuses.publish(
-        ControllerStatus(error_x=0.003, error_y=-0.004, v=0.07, obstacle_margin=math.inf)
-    )
+    assert page.until(lambda: reports.get_subscription_count() > 0)
+    way = polyline("way", np.array([[0.0, 0.0], [0.1, 0.2]]))
+    figures = (Figure("error", 5e-3, "m"), Figure("speed", 0.07, "m/s"), Figure("margin", math.inf))
+    report = Report_("push", figures, (way,))
+    reports.publish(report_to_ros(report, JobState().header.stamp, "ltv", "box"))
     message = path_to_ros([], 0.0)
     message.poses = [pose_stamped_to_ros(np.array([0.1, i / 1e3, 0.0]), 0.0) for i in range(999)]
     paths.publish(message)
     seen = page.events(lambda s: ("path", "/") in s and s.get(("panel", "/"), {}).get("rows"))
     rows = dict(seen["panel", "/"]["rows"])
-    assert rows["tracking error"] == "5.0 mm" and rows["speed"] == "70 mm/s"
-    assert rows["obstacle margin"] == "–"
+    assert rows["error"] == "5.0 mm" and rows["speed"] == "0.07 m/s"
+    assert rows["margin"] == "–" and rows["phase"] == "push" and rows["method"] == "ltv"
+    (shape,) = seen["panel", "/"]["shapes"]
+    assert shape["layer"] == "way" and shape["points"] == [[0, 0], [100, 200]]
     path = seen["path", "/"]
     assert len(path["x"]) == len(path["y"]) == 400 and path["y"][-1] == 0.998
 

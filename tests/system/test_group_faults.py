@@ -109,7 +109,7 @@ def test_the_optimizer_that_is_gone_ends_the_job_after_a_while(run, monkeypatch)
     monkeypatch.setattr(grasp_opt.node, "PATIENCE", 1.0)
     told = commands(run)
     run.planner._server._server.destroy()
-    assert run.spinner.until(lambda: not run.supervisor._optimizer.ready, 10.0)
+    assert run.spinner.until(lambda: not run.supervisor.partners.ready, 10.0)
     run.teams[""].send_goal(FAR)
     assert run.spin_until(lambda: run.observer.state.error_code != 0, 4000.0, 20.0)
     assert run.observer.state.error_code == JobError.NODE_LOST
