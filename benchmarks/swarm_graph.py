@@ -55,7 +55,8 @@ def budget(scenario: Scenario, goal: Any, ticks: int) -> dict[str, float]:
         for name in ("step", "poses", "command_all"):
             setattr(world, name, timed(getattr(world, name), spent["world"]))
         node: Any = run.controller
-        node.job.step = timed(node.job.step, spent["job"])
+        job = node.method.job
+        job.step = timed(job.step, spent["job"])
         node._poses.take = timed(node._poses.take, spent["node"])
         parts = []
         for _ in range(_PARTS):
@@ -70,7 +71,7 @@ def budget(scenario: Scenario, goal: Any, ticks: int) -> dict[str, float]:
             parts.append(np.array([physics, job, whole - job, total - physics - whole]) / done)
         if not node.busy:
             raise RuntimeError("the job ended before the measurement did")
-        if run.bridge.lockstep_timeouts:
+        if run.bridge.unanswered:
             raise RuntimeError("a tick was not answered")
     table = 1e3 * np.median(parts, axis=0)
     return dict(zip(("world", "job", "node", "rest"), map(float, table), strict=True))

@@ -6,7 +6,7 @@ import signal
 from collections.abc import Callable
 
 from push_bringup.job_result import JobEvent
-from push_bringup.systems import SYSTEMS
+from push_bringup.systems import SYSTEMS, system_names, system_of
 
 
 def add_scenario(parser: argparse.ArgumentParser, default: str | None = "env1-target1") -> None:
@@ -19,19 +19,15 @@ def add_scenario(parser: argparse.ArgumentParser, default: str | None = "env1-ta
     )
 
 
-SCENARIOS = {
-    "single": "env1-target1",
-    "torque": "wheel-slip",
-    "group": "group-ellipse",
-    "swarm": "swarm-square",
-}
-"""Default scenario of each system."""
-
-
 def add_system_and_scenario(parser: argparse.ArgumentParser) -> None:
     """The system and ``--scenario``; ``scenario_of`` resolves the latter."""
-    parser.add_argument("system", choices=list(SYSTEMS), nargs="?", default="single")
-    known = ", ".join(f"{name} for {system}" for system, name in SCENARIOS.items())
+    parser.add_argument(
+        "system",
+        nargs="?",
+        default="single",
+        help=f"one of {', '.join(system_names())}, or MODULE:ATTRIBUTE of a method",
+    )
+    known = ", ".join(f"{system.example} for {name}" for name, system in SYSTEMS.items())
     parser.add_argument(
         "--scenario", default="", help=f"a name in config/scenarios, or a file; {known}"
     )
@@ -39,7 +35,7 @@ def add_system_and_scenario(parser: argparse.ArgumentParser) -> None:
 
 def scenario_of(arguments: argparse.Namespace) -> str:
     """Name or path of the requested scenario."""
-    return str(arguments.scenario or SCENARIOS[arguments.system])
+    return str(arguments.scenario or system_of(arguments.system).example)
 
 
 def add_namespace(parser: argparse.ArgumentParser) -> None:
@@ -133,5 +129,7 @@ def tell(event: JobEvent) -> None:
     team = f"{event.team}: " if event.team else ""
     if event.kind == "state":
         print(f"  {team}{event.state:12s} {event.reason}", flush=True)
+    elif event.kind in ("silent", "returned"):
+        print(f"  {team}{event.reason}", flush=True)
     elif event.distance is not None:
         print(f"  {team}{event.distance:6.3f} m to go", flush=True)

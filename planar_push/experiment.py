@@ -19,11 +19,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=whole(0), default=1, help="seed of the first trial")
     parser.add_argument(
         "--uncertainty",
-        default="mild",
-        help="what the nodes do not know: none, mild or hard (docs/results.md)",
+        help="what the nodes do not know: none, mild or hard (docs/results.md); refused if the "
+        "study has no choice",
     )
     parser.add_argument(
-        "--world", default="", help="pybullet or planar, if the study supports both"
+        "--world", help="pybullet or planar; refused if the study supports only one"
     )
     parser.add_argument(
         "--out", default="", help="output folder; an interrupted study in it is continued"
@@ -47,8 +47,9 @@ def run(arguments: argparse.Namespace) -> int:
         Path(out),
         arguments.scheduler,
         arguments.workers,
-        arguments.uncertainty,
-        arguments.world,
+        arguments.uncertainty or "mild",
+        arguments.world or "",
+        frozenset(o for o in ("uncertainty", "world") if getattr(arguments, o) is not None),
     )
     summary = run_study(arguments.name, options)
     print(f"\n{out}/summary.json")

@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 if the job succeeds, or if its plan waits to be executed."""
+    """0 if the job succeeds, or if its plan waits; otherwise 1, with the reason and its code."""
     from push_bringup.monitor import Monitor
 
     check_namespace(arguments.namespace)
@@ -37,8 +37,9 @@ def run(arguments: argparse.Namespace) -> int:
         monitor.send_goal((arguments.x, arguments.y, arguments.theta))
         if arguments.no_wait:
             return 0
-        result = monitor.follow(arguments.timeout, lambda: monitor.supervised)
+        result = monitor.follow(arguments.timeout)
     if result.code is JobError.NONE:
         return 0
-    print(f"error: {result.reason}", file=sys.stderr)
+    code = "" if result.code is None else f" ({result.code.name})"
+    print(f"error: {result.reason}{code}", file=sys.stderr)
     return 1

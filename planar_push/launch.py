@@ -49,9 +49,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _what_next(setup: "SuiteSetup") -> str:
     """What to do next, for the terminal."""
-    from push_bringup.systems import OWNERS, teams_of
+    from push_bringup.systems import teams_of
 
-    if not any(node.kind in OWNERS for node in setup.nodes):
+    if not any(node.traits.owner for node in setup.nodes):
         spaces = [n.namespace for n in setup.nodes if n.kind == "torque_controller"]
         return "send trajectories to: " + ", ".join(f"{s}/follow_trajectory" for s in spaces)
     words = f" --namespace {setup.namespace}" if setup.namespace else ""

@@ -9,7 +9,7 @@ from typing import Any
 from push_bringup.failures import DomainInUse
 from push_bringup.launcher import Child
 from push_bringup.node_settings import changed, resolved
-from push_bringup.systems import LIVE, MODULES, NodeSpec, nodes_of, recorder
+from push_bringup.systems import LIVE, NodeSpec, nodes_of, recorder
 from push_model.settings import SettingsError
 from push_ros.claims import world_is_claimed
 from push_ros.latched import has_publisher
@@ -35,7 +35,7 @@ class SuiteSetup:
         children = []
         for node in self.nodes:
             bag = self.bag if node.kind == "recorder" else None
-            children.append(Child(node.name, MODULES[node.kind], node.words(str(file)), bag))
+            children.append(Child(node.name, node.traits.module, node.words(str(file)), bag))
         return children
 
 

@@ -19,7 +19,7 @@ from push_bringup.job_result import JobEvent, JobResult
 from push_bringup.launcher import Launcher
 from push_bringup.monitor import Monitor, Pose
 from push_bringup.preparation import check_domain, prepare
-from push_bringup.systems import MODULES, OWNERS, teams_of
+from push_bringup.systems import teams_of
 from push_model.settings import SettingsError
 from push_ros.latched import own_context
 from push_scenario.scenario import Scenario
@@ -72,7 +72,8 @@ class Suite:
         self.scenario = self.setup.scenario
         self._respawn, self._verbose = respawn, verbose
         self._on_event = on_event or (lambda event: None)
-        self._quiet = tuple(MODULES[kind] for kind in OWNERS) if on_event else ()
+        owners = [node for node in self.setup.nodes if node.traits.owner]
+        self._quiet = tuple(node.traits.module for node in owners) if on_event else ()
         self._context = context
         self._stack = ExitStack()
         self._launcher: Launcher | None = None

@@ -25,6 +25,9 @@ class JobError(IntEnum):
     CLOCK_RESET = 313
     NODE_LOST = 314
     TOO_HEAVY = 315
+    OBJECT_MOVED = 316
+    JOB_FORGOTTEN = 317
+    OWNER_SILENT = 318
 
 
 class JobPhase(IntEnum):

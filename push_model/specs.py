@@ -50,6 +50,12 @@ class RobotSpec:
     caster_clearance: float = bounded(
         2e-4, low=0.0, high=0.1, doc="Height of the casters above the floor at rest (m)"
     )
+    robot_friction: float = bounded(
+        1.0,
+        low=0.01,
+        high=2.0,
+        doc="Friction coefficient between two robots of this type (dimensionless).",
+    )
 
     def __post_init__(self) -> None:
         axle = self.drive.wheel_radius if isinstance(self.drive, DifferentialDrive) else None

@@ -67,6 +67,17 @@ class TrajectoryTracker:
         """Number of solves that could not be used."""
         return self._command.failures
 
+    @property
+    def push(self) -> Push | None:
+        """What the task pushes, if it does."""
+        return None if self._task is None else self._task.push
+
+    def believe(self, push: Push | None, delay: float) -> None:
+        """Go on with another belief: of the push under way, and of the latency [s] of the poses."""
+        if self._task is not None and push is not None:
+            self._task = replace(self._task, push=push)
+        self._reckoning.delay = delay
+
     def warm_up(self) -> None:
         """Compile and solve once, so that the first command does not wait."""
         self.controller.warm_up()

@@ -7,9 +7,11 @@ from typing import Any, cast
 
 import numpy as np
 
+from push_job.report import Report
 from push_model.arrays import Array
 from push_record.bag import read_bag, read_metadata
 from push_record.collisions import Collisions
+from push_ros.report_conversions import report_from_ros
 from push_ros.validation import InvalidMessage, planar_pose
 from push_scenario.scenario import Scenario, scenario_from_text
 
@@ -25,21 +27,8 @@ STATUS = (
 )
 """Columns of a controller's status, see push_msgs/ControllerStatus."""
 
-GROUP_STATUS = (
-    "time",
-    "position_error",
-    "orientation_error",
-    "lacking",
-    "margin",
-    "solve_time",
-    "wrench_x",
-    "wrench_y",
-    "wrench_torque",
-)
-"""Columns of a group's status, see push_msgs/GroupStatus."""
-
 _SPACING = 0.02  # [s] shortest time between frames that are kept
-_MOMENTS = 2.0  # [s] between complete messages of a swarm that are kept
+_MOMENTS = 2.0  # [s] between complete reports that are kept
 _MOVING = (1, 2)  # modes MOVE and PUSH of ControllerStatus
 
 
@@ -54,33 +43,35 @@ class State:
 
 
 @dataclass
-class GroupPushes:
-    """One push of a group: pushers, and rows of numbers at its ticks.
+class ReportSeries:
+    """What one method or controller reported.
 
-    rows: of GROUP_STATUS. points, normals, forces: ``(n, 2)`` each, fixed frame, by tick.
+    times [s] and phases of its reports. figures: by name, unit, times [s] and values. moments: time
+    [s] and whole report, every few seconds.
     """
 
-    pushers: tuple[str, ...]
-    friction: float
-    rows: list[list[float]] = field(default_factory=list)
-    points: list[Array] = field(default_factory=list)
-    normals: list[Array] = field(default_factory=list)
-    forces: list[Array] = field(default_factory=list)
+    method: str
+    times: list[float] = field(default_factory=list)
+    phases: list[str] = field(default_factory=list)
+    figures: dict[str, tuple[str, list[float], list[float]]] = field(default_factory=dict)
+    moments: list[tuple[float, Report]] = field(default_factory=list)
 
-
-@dataclass
-class SwarmTicks:
-    """Status of a swarm: rows of time [s], position error [m], orientation error [rad], CPU [s] and
-    phase; and complete push_msgs/SwarmStatus messages every few seconds."""
-
-    rows: list[tuple[float, float, float, float, str]] = field(default_factory=list)
-    moments: list[Any] = field(default_factory=list)
+    def take(self, time: float, report: Report) -> None:
+        """Add a report of a time [s]."""
+        self.times.append(time)
+        self.phases.append(report.phase)
+        for figure in report.figures:
+            _, times, values = self.figures.setdefault(figure.name, (figure.unit, [], []))
+            times.append(time)
+            values.append(figure.value)
+        if not self.moments or time - self.moments[-1][0] >= _MOMENTS:
+            self.moments.append((time, report))
 
 
 @dataclass
 class Job:
     """What a team did. goal ``(3,)``: the last one; plan: ``(n, 2)`` [m] path of the axle in each
-    push, or of the object that a group pushes; pushes: of a group; swarm: of a swarm."""
+    push, or of the object that a group pushes; reports: by topic, of method and controllers."""
 
     space: str
     system: str = ""
@@ -89,8 +80,7 @@ class Job:
     states: list[State] = field(default_factory=list)
     goal: Array | None = None
     plan: list[Array] = field(default_factory=list)
-    pushes: list["GroupPushes"] = field(default_factory=list)
-    swarm: SwarmTicks = field(default_factory=SwarmTicks)
+    reports: dict[str, ReportSeries] = field(default_factory=dict)
 
 
 @dataclass
@@ -185,13 +175,13 @@ def load(bag: Path) -> BagContents:
     contents = BagContents(scenario, metadata, collisions)
     frames = _Frames((*scenario.robots, *scenario.objects))
     status: dict[str, list[list[float]]] = {}
+    series: dict[str, ReportSeries] = {}
     wanted = _Suffixes(
         "ground_truth/poses",
         "job_state",
         "push_plan",
         "group_plan",
-        "group_status",
-        "swarm_status",
+        "report",
         "contacts",
         "controller/status",
     )
@@ -203,6 +193,13 @@ def load(bag: Path) -> BagContents:
             if m.mode in _MOVING:
                 row = [_seconds(m.header.stamp), *(getattr(m, k) for k in STATUS[1:])]
                 status.setdefault(str(m.robot), []).append(row)
+        elif record.topic.endswith("/report"):
+            try:
+                report = report_from_ros(m)
+            except InvalidMessage:  # what somebody recorded need not be right
+                continue
+            told = series.setdefault(record.topic, ReportSeries(str(m.method)))
+            told.take(_seconds(m.header.stamp), report)
         elif record.topic.endswith("/contacts"):
             collisions.take(_seconds(m.header.stamp), m.body_a, m.body_b)
         else:
@@ -212,13 +209,10 @@ def load(bag: Path) -> BagContents:
                 _take_state(job, m)
             elif record.topic.endswith("/group_plan"):
                 job.plan.append(np.column_stack([m.x, m.y]))
-                job.pushes.append(GroupPushes(tuple(m.pushers), 0.0))
-            elif record.topic.endswith("/group_status"):
-                _take_group_status(job, m)
-            elif record.topic.endswith("/swarm_status"):
-                _take_swarm_status(job.swarm, m)
             else:
                 job.plan = [np.column_stack([s.trajectory.x, s.trajectory.y]) for s in m.segments]
+    for topic, told in series.items():
+        _give(contents.jobs, topic, told)
     contents.time, contents.poses = frames.finish()
     for robot, rows in status.items():
         table = np.array(rows, dtype=np.float64)
@@ -226,37 +220,14 @@ def load(bag: Path) -> BagContents:
     return contents
 
 
-def _take_swarm_status(swarm: SwarmTicks, message: Any) -> None:
-    time = _seconds(message.header.stamp)
-    swarm.rows.append(
-        (
-            time,
-            float(message.position_error),
-            float(message.orientation_error),
-            float(message.solve_time),
-            str(message.phase),
-        )
-    )
-    if not swarm.moments or time - _seconds(swarm.moments[-1].header.stamp) >= _MOMENTS:
-        swarm.moments.append(message)
-
-
-def _take_group_status(job: Job, message: Any) -> None:
-    if not job.pushes or not len(message.force_x):
-        return
-    push = job.pushes[-1]
-    if push.pushers != tuple(message.pushers):
-        return
-    push.friction = float(message.friction)
-    push.rows.append(
-        [_seconds(message.header.stamp), *(getattr(message, k) for k in GROUP_STATUS[1:])]
-    )
-    for kept, x, y in (
-        (push.points, message.contact_x, message.contact_y),
-        (push.normals, message.normal_x, message.normal_y),
-        (push.forces, message.force_x, message.force_y),
-    ):
-        kept.append(np.column_stack([x, y]))
+def _give(jobs: dict[str, Job], topic: str, series: ReportSeries) -> None:
+    """To the job of the team, or of the robot, that a topic of reports belongs to."""
+    space = topic.rpartition("/")[0] + "/"
+    robot = space.rstrip("/").rpartition("/")[2]
+    for job in jobs.values():
+        if job.space == space or robot in job.robots:
+            job.reports[topic] = series
+            return
 
 
 def _take_state(job: Job, message: Any) -> None:

@@ -40,7 +40,6 @@ from push_scenario.teams import (
 )
 
 __all__ = [
-    "NODES",
     "Scenario",
     "ScenarioFile",
     "config_directory",
@@ -51,18 +50,6 @@ __all__ = [
     "scenario_from_text",
     "scenario_names",
 ]
-
-NODES = (
-    "bridge",
-    "planner",
-    "controller",
-    "supervisor",
-    "torque_controller",
-    "group",
-    "optimizer",
-    "swarm",
-)
-"""Nodes that a scenario may have parameters for."""
 
 
 @settings
@@ -85,10 +72,6 @@ class ScenarioFile:
             raise SettingsError("with teams, goals belong to the teams, not to the scenario")
         if not self.robots:
             raise SettingsError("robots: at least one robot is needed")
-        for node in self.parameters:
-            if node not in NODES:
-                known = ", ".join(NODES)
-                raise SettingsError(f"parameters: unknown node '{node}'; expected one of: {known}")
 
 
 @dataclass(frozen=True)
@@ -194,7 +177,8 @@ class Scenario:
         nodes: node name to all of its settings, e.g. ``asdict`` of its settings class. A bag that
             is recorded with these in its scenario does not change when a default does.
         """
-        parameters = {n: _filled(self.parameters.get(n, {}), nodes.get(n, {})) for n in NODES}
+        names = dict.fromkeys((*nodes, *self.parameters))
+        parameters = {n: _filled(self.parameters.get(n, {}), nodes.get(n, {})) for n in names}
         return replace(self, parameters={n: v for n, v in parameters.items() if v})
 
     def check(self, where: str = "scenario") -> None:

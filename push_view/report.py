@@ -16,7 +16,7 @@ from push_model import se2
 from push_record.contents import BagContents, Job, load
 from push_view.animation import write_animation
 from push_view.drawing import INK, draw_trajectory
-from push_view.panels import panel_of
+from push_view.report_panel import draw_report
 
 PRODUCTS = ("trajectory.png", "animation.gif", "report.pdf")
 """Files of a report."""
@@ -136,13 +136,11 @@ def _first_page(
 
 
 def _team_page(pdf: Any, contents: BagContents, job: Job, heading: str) -> None:
-    """The map with the team's plan and goal, and the panel of its system below."""
+    """The map with the team's plan and goal, and its reports below."""
     page = plt.figure(figsize=_PAGE)
     layout = page.add_gridspec(2, 1, height_ratios=[1.0, 1.35], hspace=0.16)
     draw_trajectory(page.add_subplot(layout[0]), contents, [job])
-    panel = panel_of(job.system)
-    if panel is not None:
-        panel.draw(page, layout[1], contents, job)
+    draw_report(page, layout[1], contents, job)
     page.suptitle(heading, fontsize=9)
     pdf.savefig(page)
     plt.close(page)

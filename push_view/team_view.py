@@ -18,7 +18,7 @@ from push_ros.process import heard
 from push_ros.qos import COMMAND, LATCHED
 from push_ros.validation import InvalidMessage, planar_pose
 from push_view.event_board import EventBoard
-from push_view.panels import LivePanel, panel_of
+from push_view.report_panel import LivePanel
 
 _LOG = 60  # states kept
 _POINTS = 400  # of a path that are sent to a page
@@ -62,9 +62,9 @@ class TeamView:
         self.hears = heard(self._node, self._goals)
 
     def show_panel(self) -> None:
-        """Bring the panel's rows up to date."""
+        """Bring the figures and shapes of its reports up to date."""
         if self._panel is not None:
-            self._put("panel", rows=self._panel.rows())
+            self._put("panel", rows=self._panel.rows(), shapes=self._panel.shapes())
 
     def goal_message(self, pose: Array, nanoseconds: int) -> PoseStamped:
         """A goal ``(3,)``, stamped with a wall time [ns]."""
@@ -115,7 +115,7 @@ class TeamView:
             self._put("log", entries=self._log)
 
     def _follow(self, message: JobState) -> None:
-        """Send the page the members of the team, and the panel of its system."""
+        """Send the page the members of the team, and the reports of its method."""
         of = (message.system, tuple(message.robots))
         if of == self._of:
             return
@@ -124,8 +124,7 @@ class TeamView:
         if self._panel is not None:
             self._panel.close()
             self._board.drop(f"panel {self.space}")
-        panel = panel_of(message.system)
-        self._panel = None if panel is None else panel.live(self._node, self.names, of[1])
+        self._panel = LivePanel(self._node, self.names, of[1])
 
     def _on_path(self, message: Path) -> None:
         points = np.array([[p.pose.position.x, p.pose.position.y] for p in message.poses])

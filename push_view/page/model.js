@@ -10,7 +10,7 @@ export const emptyModel = () => ({
 });
 
 export const newTeam = () => ({
-  state: null, robots: [], log: [], path: null, rows: [], members: new Set(), job: null,
+  state: null, robots: [], log: [], path: null, rows: [], shapes: [], members: new Set(), job: null,
 });
 
 const teamOf = (model, space) => {
@@ -59,7 +59,7 @@ const takers = {
   },
   log: (model, data) => { teamOf(model, data.space).log = data.entries; },
   path: (model, data) => { teamOf(model, data.space).path = data; },
-  panel: (model, data) => { teamOf(model, data.space).rows = data.rows; },
+  panel: (model, data) => { Object.assign(teamOf(model, data.space), {rows: data.rows, shapes: data.shapes}); },
 };
 
 function takeMembers(model, team) {

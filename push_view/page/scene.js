@@ -60,10 +60,39 @@ export class Scene {
       const state = model.teams.get(space)?.state;
       if (state?.goal) this.object(f, model, state.object, state.goal, space === chosen ? 2 : 1, false);
     }
+    for (const space of model.spaces) this.layers(f, model.teams.get(space)?.shapes ?? []);
     this.bodies(f, model, colors);
     const item = model.teams.get(chosen)?.state?.object;
     if (drag && item) this.object(f, model, item, [drag.place.x, drag.place.y, drag.theta], 2, drag.long);
     if (drag) this.arrow(f, drag);
+  }
+
+  // Shapes of reports: polylines, polygons, discs and arrows; points in millimetres.
+  layers(f, shapes) {
+    for (const {kind, colour, radius, points} of shapes) {
+      const metres = points.map(([x, y]) => [x / 1e3, y / 1e3]);
+      if (kind === 2) this.discs(f, metres, colour, radius);
+      else if (kind === 3) for (let i = 0; i + 1 < metres.length; i += 2) this.pointed(f, metres[i], metres[i + 1], colour);
+      else this.line(f, kind === 1 && metres.length ? [...metres, metres[0]] : metres, colour, 1);
+    }
+  }
+
+  discs(f, points, colour, radius) {
+    const pen = this.pen;
+    pen.globalAlpha = 0.6; pen.fillStyle = colour;
+    for (const [x, y] of points) {
+      pen.beginPath();
+      pen.arc(...toPixels(f, x, y), Math.max(2 * this.ratio, radius * f.scale), 0, 2 * Math.PI);
+      pen.fill();
+    }
+    pen.globalAlpha = 1;
+  }
+
+  pointed(f, tail, head, colour) {
+    const a = Math.atan2(head[1] - tail[1], head[0] - tail[0]), l = 7 * this.ratio / f.scale;
+    const barb = turn => [head[0] - l * Math.cos(a + turn), head[1] - l * Math.sin(a + turn)];
+    this.line(f, [tail, head], colour, 2);
+    this.line(f, [barb(0.4), head, barb(-0.4)], colour, 2);
   }
 
   // Colour by body: that of its type, or of its team if there are several teams.

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 import yaml
 
-from push_bringup.node_settings import SECTIONS, check_settings, resolved
+from push_bringup.node_kinds import MODULES, SECTIONS
+from push_bringup.node_settings import check_settings, resolved
 from push_bringup.preparation import check_bag, prepare
-from push_bringup.systems import LIVE, MODULES, nodes_of, single, teams_of
+from push_bringup.systems import LIVE, nodes_of, single, teams_of
 from push_model.settings import SettingsError
 from push_scenario.scenario import load_scenario, scenario_from_mapping, scenario_from_text
 
