@@ -1,4 +1,4 @@
-"""Options that several verbs share, with their checks."""
+"""Arguments that several commands share, with their checks."""
 
 import argparse
 import math
@@ -20,7 +20,7 @@ def add_scenario(parser: argparse.ArgumentParser, default: str | None = "env1-ta
 
 
 def add_system_and_scenario(parser: argparse.ArgumentParser) -> None:
-    """The system, of those that are there, and ``--scenario``; ``scenario_of`` tells which."""
+    """The system and ``--scenario``; ``scenario_of`` resolves the latter."""
     parser.add_argument(
         "system",
         nargs="?",
@@ -34,7 +34,7 @@ def add_system_and_scenario(parser: argparse.ArgumentParser) -> None:
 
 
 def scenario_of(arguments: argparse.Namespace) -> str:
-    """Name or path of the scenario that was asked for."""
+    """Name or path of the requested scenario."""
     return str(arguments.scenario or system_of(arguments.system).example)
 
 

@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when the job ends well, or waits to be executed; else 1, with the reason and its code."""
+    """0 if the job succeeds, or if its plan waits; otherwise 1, with the reason and its code."""
     from push_bringup.monitor import Monitor
 
     check_namespace(arguments.namespace)

@@ -48,7 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _what_next(setup: "SuiteSetup") -> str:
-    """How to make it do something."""
+    """What to do next, for the terminal."""
     from push_bringup.systems import teams_of
 
     if not any(node.traits.owner for node in setup.nodes):

@@ -27,8 +27,8 @@ STATUS = (
 )
 """Columns of a controller's status, see push_msgs/ControllerStatus."""
 
-_SPACING = 0.02  # [s] least, between frames that are kept
-_MOMENTS = 2.0  # [s] between reports that are kept whole
+_SPACING = 0.02  # [s] shortest time between frames that are kept
+_MOMENTS = 2.0  # [s] between complete reports that are kept
 _MOVING = (1, 2)  # modes MOVE and PUSH of ControllerStatus
 
 
@@ -57,7 +57,7 @@ class ReportSeries:
     moments: list[tuple[float, Report]] = field(default_factory=list)
 
     def take(self, time: float, report: Report) -> None:
-        """One more report, of a time [s]."""
+        """Add a report of a time [s]."""
         self.times.append(time)
         self.phases.append(report.phase)
         for figure in report.figures:
@@ -70,8 +70,8 @@ class ReportSeries:
 
 @dataclass
 class Job:
-    """What a team did. goal ``(3,)``: the last one; plan: ``(n, 2)`` [m] of each push's axle, or of
-    the object that a group pushes; reports: by topic, of its method and its controllers."""
+    """What a team did. goal ``(3,)``: the last one; plan: ``(n, 2)`` [m] path of the axle in each
+    push, or of the object that a group pushes; reports: by topic, of method and controllers."""
 
     space: str
     system: str = ""

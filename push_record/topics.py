@@ -39,7 +39,7 @@ class Topic:
 
     @property
     def latched(self) -> bool:
-        """Whether a late reader gets the last message."""
+        """Whether a late subscriber gets the last message."""
         return self.qos is LATCHED or self.qos is BELIEF
 
     @property
@@ -94,7 +94,7 @@ MANY = 50
 then not recorded, because a few subscriptions per robot would cost too much."""
 
 SHOWN = ("clock", "poses", "map", "scenario", "paused", "belief", "tf", "visualization")
-"""Of the world's: what a playback shows. Commands and ground truth are not published again."""
+"""Topics of the world that a playback publishes. Commands and ground truth are left out."""
 
 
 def team_names(scenario: Scenario, namespace: str = "") -> dict[str, Names]:

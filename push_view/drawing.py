@@ -16,8 +16,8 @@ from push_view.bodies import Bodies, bodies_of
 
 PLAN, GOAL, INK = "#777777", "#c22f3d", "#222222"
 
-_NAMED = 6  # bodies that have a name each in the legend
-_WAY_POINTS = 2000  # of all that a way is drawn with
+_NAMED = 6  # number of bodies up to which each is named in the legend
+_WAY_POINTS = 2000  # number of points with which a path is drawn
 
 
 def draw_map(axes: Axes, grid: OccupancyGrid) -> None:
@@ -112,7 +112,7 @@ def draw_jobs(axes: Axes, bodies: Bodies, jobs: Iterable[Job]) -> None:
 
 
 def draw_trajectory(axes: Axes, contents: BagContents, jobs: Iterable[Job] | None = None) -> None:
-    """Map, plans and goals of some teams or all, ways of all bodies, them at moments."""
+    """Map, plans and goals of teams, paths of all bodies, and the bodies at a few times."""
     bodies = bodies_of(contents.scenario)
     draw_map(axes, contents.scenario.grid)
     draw_jobs(axes, bodies, contents.jobs.values() if jobs is None else jobs)

@@ -115,7 +115,7 @@ class TeamView:
             self._put("log", entries=self._log)
 
     def _follow(self, message: JobState) -> None:
-        """Give the page who belongs to the team, and what its method reports."""
+        """Send the page the members of the team, and the reports of its method."""
         of = (message.system, tuple(message.robots))
         if of == self._of:
             return

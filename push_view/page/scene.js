@@ -67,7 +67,7 @@ export class Scene {
     if (drag) this.arrow(f, drag);
   }
 
-  // What methods report: polylines, polygons, discs and arrows; points in millimetres.
+  // Shapes of reports: polylines, polygons, discs and arrows; points in millimetres.
   layers(f, shapes) {
     for (const {kind, colour, radius, points} of shapes) {
       const metres = points.map(([x, y]) => [x / 1e3, y / 1e3]);
@@ -95,7 +95,7 @@ export class Scene {
     this.line(f, [barb(0.4), head, barb(-0.4)], colour, 2);
   }
 
-  // Colour by body: its type's, or its team's where there are several teams.
+  // Colour by body: that of its type, or of its team if there are several teams.
   colors(model) {
     const {type, types} = model.bodies, result = type.map(t => types[t].color);
     if (model.spaces.length > 1) {

@@ -57,7 +57,7 @@ def test_an_outline_replaces_the_shape():
         ("box", "latency", (0.1, 0.1, 0.1), "pose stream"),
         ("box", "mass", (0.2, -1.0, 0.3), "outside"),
         ("box", "contact_friction", (0.2, 0.1, 9.0), "outside"),
-        ("box", "com_x", (0.5, 0.5, 0.5), "tips over"),
+        ("box", "com_x", (0.5, 0.5, 0.5), "tip over"),
     ],
 )
 def test_what_cannot_be_is_refused_with_the_reason(body, quantity, ends, why):
