@@ -229,6 +229,7 @@ def test_goal_ends_with_the_suite(domain, tmp_path):
     assert process.returncode == 1 and "ended before the job" in error
 
 
+@pytest.mark.long
 def test_goal_waits_for_an_owner_that_is_frozen_and_says_when_it_was_restarted(domain, tmp_path):
     """Issue 18, row 18: 8 s without the supervisor, longer than it stays in the graph."""
     events, said = [], []
