@@ -12,10 +12,10 @@ _PATIENCE = 10.0  # [s] wall time for the suite to be found
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this verb."""
-    parser.add_argument("x", type=finite, help="[m]")
-    parser.add_argument("y", type=finite, help="[m]")
-    parser.add_argument("theta", type=finite, help="[rad]")
-    parser.add_argument("--team", default="", help="whose goal it is, where there are teams")
+    parser.add_argument("x", type=finite, help="[m] in the map frame")
+    parser.add_argument("y", type=finite, help="[m] in the map frame")
+    parser.add_argument("theta", type=finite, help="[rad] heading")
+    parser.add_argument("--team", default="", help="name of the team, if there are several")
     parser.add_argument("--no-wait", action="store_true")
     add_timeout(parser, 300.0)
     add_namespace(parser)

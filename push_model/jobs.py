@@ -1,4 +1,7 @@
-"""How the job of moving an object can end, whoever does it: one robot, a group or a swarm."""
+"""Codes and states of the job of moving an object, by one robot, a group or a swarm.
+
+docs/errors.md says what each code means and what to do.
+"""
 
 from enum import IntEnum
 
@@ -39,7 +42,7 @@ class JobPhase(IntEnum):
 
 
 class GoalRefused(Exception):
-    """A goal that cannot be taken; carries the code."""
+    """A goal that is refused; carries the code."""
 
     def __init__(self, code: JobError, message: str) -> None:
         super().__init__(message)

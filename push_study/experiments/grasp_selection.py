@@ -26,9 +26,9 @@ from push_model.occupancy import rasterise
 from push_model.settings import SettingsError
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
 from push_scenario.bodies import load_object, load_robot
-from push_study.experiments.group_goals import scattered
 from push_study.group_world import TICK, GroupWorld
 from push_study.pool import Row
+from push_study.rooms import scattered
 from push_study.statistics import sign_test
 from push_study.study import StudyOptions
 from push_study.summary import by_cell
@@ -120,8 +120,8 @@ def trial(task: SelectionTask) -> Row:
     grid, start = rasterise(room), path.pose[0]
     outline = se2.transform(start, item.geometry.outline)
     random = np.random.default_rng(task.seed)
-    size = (float(reach[0]), float(reach[1]))
-    spots = scattered(random, ROBOTS, FreeSpace(grid), outline, robot.footprint_radius, size)
+    radius = robot.footprint_radius
+    spots = scattered(random, ROBOTS, FreeSpace(grid), outline, radius, gap=0.03)
     planner, job = StepPlanner(grid, item, robot), GroupJob(item, robot, ROBOTS)
     doubt, begin = uncertainty(task.uncertainty), item.geometric_pose(start)
     with GroupWorld(room, robot, spots, item, begin, doubt, task.seed, task.world) as world:

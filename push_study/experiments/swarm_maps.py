@@ -2,8 +2,8 @@
 
 from push_study.pool import Row
 from push_study.study import StudyOptions
-from push_study.swarm_map import MAPS, MapTask, run
-from push_study.swarm_maps import conclude, tasks_of
+from push_study.swarm.map_tables import conclude, tasks_of
+from push_study.swarm.maps import MAPS, MapTask, run
 
 __all__ = ["OPTIONS", "SCENARIOS", "conclude", "tasks", "trial"]
 

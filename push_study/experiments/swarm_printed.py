@@ -8,8 +8,8 @@ from typing import Any
 from push_study.pool import Row
 from push_study.study import StudyOptions
 from push_study.summary import by_cell
-from push_study.swarm_run import SwarmTask, run
-from push_study.swarm_shapes import SHAPES, conclude, tasks_by
+from push_study.swarm.shapes import SHAPES, conclude, tasks_by
+from push_study.swarm.targets import SwarmTask, run
 
 __all__ = ["OPTIONS", "SCENARIOS", "conclude", "statistics", "tasks", "trial"]
 

@@ -18,7 +18,7 @@ from push_model.settings import SettingsError
 from push_study.pool import Row
 from push_study.study import StudyOptions
 from push_study.summary import by_cell
-from push_study.swarm_run import EXPERIMENT, SwarmTask, draw_ways, length, run
+from push_study.swarm.targets import EXPERIMENT, SwarmTask, draw_ways, length, run
 from push_study.thesis import SWARM_REAL, SWARM_RIVALS
 
 SCENARIOS = ("swarm_square",)

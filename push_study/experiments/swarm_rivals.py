@@ -18,7 +18,7 @@ from push_scenario.bodies import load_object
 from push_study.pool import Row
 from push_study.study import StudyOptions
 from push_study.summary import by_cell
-from push_study.swarm_rival import OURS, RIVALS, RivalTask, run
+from push_study.swarm.contest import OURS, RIVALS, RivalTask, run
 
 SCENARIOS = (
     "transport_square",
