@@ -80,17 +80,12 @@ DECIDES_NOTHING = {
     "push_record/player.py": "plays a bag; there is no bridge beside it",
     "push_record/recorder.py": "stamps of a live bag",
     "push_study/progress.py": PERSON,
+    "push_study/graph_run.py:LockstepRun.connect": START,
+    "push_ros/method_node.py:MethodNode.__init__": LIVE,
+    "push_ros/method_node.py:MethodNode._step": COST,
+    "grasp_opt/plan_source.py": COST,
 }
 """Files, classes or functions, with the reason."""
-
-SHELL_OF_TEAMS = {
-    "push_ros/team_node.py",
-    "grasp_opt/node.py",
-    "swarm_push/node.py",
-    "push_study/graph_run.py",
-}
-"""These still wait by the wall clock. They go with the shell that hosts every job."""
-
 
 def looks(tree):
     """Name of the function or class that looks at a clock, and the line, for each look."""
@@ -134,15 +129,12 @@ def all_looks():
 def test_every_look_at_a_wall_clock_is_known_to_decide_nothing_in_lockstep():
     used, unknown = set(), []
     for path, name, line in all_looks():
-        if path in SHELL_OF_TEAMS:
-            used.add(path)
-            continue
         key = listed(path, name)
         used.add(key)
         if key is None:
             unknown.append(f"{path}:{line} in {name or 'the module'}")
     assert not unknown, "\n".join(unknown)
-    stale = (set(DECIDES_NOTHING) | SHELL_OF_TEAMS) - used
+    stale = set(DECIDES_NOTHING) - used
     assert not stale, stale
 
 
