@@ -87,6 +87,7 @@ DECIDES_NOTHING = {
 }
 """Files, classes or functions, with the reason."""
 
+
 def looks(tree):
     """Name of the function or class that looks at a clock, and the line, for each look."""
     found = []
