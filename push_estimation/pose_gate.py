@@ -21,18 +21,50 @@ from push_model.settings import bounded, settings
 class PoseGateSettings:
     """When a pose is too old or too far."""
 
-    timeout: float = bounded(0.15, low=0.01, high=5.0, doc="[s] age at which a pose is stale")
-    max_speed: float = bounded(0.5, low=0.01, high=20.0, doc="[m/s] a body can plausibly move")
-    max_turn_rate: float = bounded(10.0, low=0.1, high=100.0, doc="[rad/s] it can plausibly turn")
-    jump_margin: float = bounded(0.02, low=0.0, high=1.0, doc="[m] allowed beyond max_speed")
-    turn_margin: float = bounded(0.2, low=0.0, high=3.2, doc="[rad] allowed beyond max_turn_rate")
-    persistence: int = bounded(
-        10, low=1, high=1000, doc="frames a jumped pose must persist before it is believed"
+    timeout: float = bounded(
+        0.15, low=0.01, high=5.0, doc="Age at which the last pose of a body is stale (s)."
     )
-    reset_gap: float = bounded(0.5, low=0.01, high=60.0, doc="[s] back in time that means a reset")
-    leap: float = bounded(10.0, low=0.1, high=3600.0, doc="[s] ahead that a stamp is not believed")
+    max_speed: float = bounded(
+        0.5, low=0.01, high=20.0, doc="Speed that a body can plausibly have (m/s)."
+    )
+    max_turn_rate: float = bounded(
+        10.0, low=0.1, high=100.0, doc="Turn rate that a body can plausibly have (rad/s)."
+    )
+    jump_margin: float = bounded(
+        0.02,
+        low=0.0,
+        high=1.0,
+        doc="Distance between two poses that is accepted beyond what max_speed explains (m).",
+    )
+    turn_margin: float = bounded(
+        0.2,
+        low=0.0,
+        high=3.2,
+        doc="Angle between two poses that is accepted beyond what max_turn_rate explains (rad).",
+    )
+    persistence: int = bounded(
+        10,
+        low=1,
+        high=1000,
+        doc="Frames that an implausible pose must persist before it is accepted.",
+    )
+    reset_gap: float = bounded(
+        0.5,
+        low=0.01,
+        high=60.0,
+        doc="Step back of the stamps from which on it counts as a reset of the clock (s).",
+    )
+    leap: float = bounded(
+        10.0,
+        low=0.1,
+        high=3600.0,
+        doc="Step ahead of a stamp from which on it is refused at first (s).",
+    )
     stamp_persistence: int = bounded(
-        3, low=1, high=1000, doc="frames in a row that make a reset, or a leap, believed"
+        3,
+        low=1,
+        high=1000,
+        doc="Frames in a row that make a reset, or a large step ahead, accepted.",
     )
 
 

@@ -256,6 +256,8 @@ def _run(
         count = len(task.targets)
         reached = count if code is JobError.NONE else min(status.index, count)
         error = _errors(watcher.trace.now[0], task.goal)
+        latency, spread = run.bridge.applied_latency
+        drawn = drawn | {"applied_latency_s": latency, "applied_latency_std_s": spread}
         return Outcome(reached, code, reason, seconds, planning, error, watcher.trace, drawn)
 
 

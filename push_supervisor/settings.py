@@ -7,7 +7,9 @@ from push_model.settings import bounded, settings
 class SupervisorSettings:
     """Tolerances, patience and speeds of a job."""
 
-    auto_execute: bool = True
+    auto_execute: bool = bounded(
+        True, doc="Whether a plan is carried out at once, without the execute command."
+    )
     position_tolerance: float = bounded(
         0.012,
         low=1e-3,

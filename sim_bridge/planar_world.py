@@ -42,11 +42,22 @@ class PlanarSettings:
     """Step and solver of the planar world."""
 
     time_step: float = bounded(
-        5e-3, low=1e-4, high=2e-2, doc="[s] longest physics step; a tick is a whole number of them"
+        5e-3,
+        low=1e-4,
+        high=2e-2,
+        doc="Longest physics step (s). A control tick is a whole number of steps.",
     )
-    solver_iterations: int = bounded(20, low=5, high=1000, doc="turns of every contact at most")
+    solver_iterations: int = bounded(
+        20,
+        low=5,
+        high=1000,
+        doc="Largest number of iterations over all contacts in one physics step.",
+    )
     tolerance: float = bounded(
-        1e-3, low=0.0, high=1.0, doc="[N] change of a force below which turns end"
+        1e-3,
+        low=0.0,
+        high=1.0,
+        doc="Change of every contact force below which the iterations end (N).",
     )
 
 

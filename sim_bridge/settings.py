@@ -66,8 +66,12 @@ class MotionCaptureSettings:
 class BridgeSettings:
     """Pace, safety and publishing of the bridge."""
 
-    world: str = "pybullet"
-    lockstep: bool = False
+    world: str = bounded("pybullet", doc="Kind of the simulated world: pybullet or planar.")
+    lockstep: bool = bounded(
+        False,
+        doc="Whether every tick waits until all commanded robots have answered the last one, "
+        "however long that takes. Otherwise the world runs at real_time_factor.",
+    )
     real_time_factor: float = bounded(
         1.0,
         low=0.01,

@@ -2,11 +2,14 @@
 
 import ast
 import importlib
+import re
+import sys
 import tomllib
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+import yaml
 
 from push_bringup.node_kinds import MODULES
 
@@ -42,6 +45,66 @@ def test_every_ros_package_that_is_imported_is_declared():
                     imported |= {a.name.split(".")[0] for a in node.names}
     ros = {n for n in imported if n == "rclpy" or n.endswith(("_msgs", "_srvs", "_interfaces"))}
     assert ros <= declared, ros - declared
+
+
+def requirement(line):
+    """Name of a requirement, as PyPI writes it."""
+    return re.match(r"[A-Za-z0-9._-]+", line)[0].lower()
+
+
+def key_of(name):
+    """What package.xml calls a Python package."""
+    if name in ROS_WHEELS:
+        return ROS_WHEELS[name]
+    return UBUNTU.get(name, f"python3-{name}-pip")
+
+
+ROS_WHEELS = {
+    "ros-jazzy-rclpy": "rclpy",
+    "ros-jazzy-common-interfaces": "std_msgs",
+    "push-msgs": "push_msgs",
+}
+UBUNTU = {"pyyaml": "python3-yaml"}
+"""Packages that Ubuntu 24.04 has in a version that will do, with their keys."""
+
+
+def test_package_xml_names_every_dependency_of_pyproject_and_nothing_else():
+    package = ElementTree.parse(ROOT / "package.xml").getroot()
+    declared = {e.text for e in package.findall("exec_depend")}
+    needed = {key_of(requirement(line)) for line in PROJECT["project"]["dependencies"]}
+    assert needed <= declared, needed - declared
+    python = {key for key in declared if key.startswith("python3-")}
+    assert python <= needed, python - needed
+
+
+def test_rosdep_yaml_has_every_key_that_rosdep_lacks_in_the_version_asked_for():
+    rules = yaml.safe_load((ROOT / "rosdep.yaml").read_text())
+    lines = {key_of(requirement(line)): line for line in PROJECT["project"]["dependencies"]}
+    assert set(rules) == {key for key in lines if key.endswith("-pip")}
+    for key, rule in rules.items():
+        assert set(rule) == {"debian", "ubuntu"}
+        for system in rule.values():
+            assert system == {"pip": {"packages": [lines[key]]}}
+
+
+def test_every_package_that_is_imported_is_a_dependency():
+    """Third-party packages by the names that they are imported by; extras are optional."""
+    of_pydantic = dict.fromkeys(("annotated_types", "pydantic_core"), "pydantic")
+    names = {"yaml": "pyyaml", "PIL": "pillow", **of_pydantic}
+    known = {requirement(line) for line in PROJECT["project"]["dependencies"]}
+    extra = {"distributed", "dask", "shapely", "pytest", "hypothesis"}
+    ours = {name.split(".")[0] for name in PROJECT["tool"]["setuptools"]["packages"]}
+    third = set()
+    for package in ours - {"push_config", "benchmarks"}:
+        for file in (ROOT / package).rglob("*.py"):
+            for node in ast.walk(ast.parse(file.read_text())):
+                if isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                    third.add(node.module.split(".")[0])
+                elif isinstance(node, ast.Import):
+                    third |= {a.name.split(".")[0] for a in node.names}
+    ros = {n for n in third if n == "rclpy" or n.endswith(("_msgs", "_srvs", "_interfaces"))}
+    third -= ours | ros | set(sys.stdlib_module_names)
+    assert {names.get(n, n) for n in third} <= known | extra
 
 
 def test_shared_files_are_where_ros_looks_for_them():

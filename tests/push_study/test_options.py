@@ -9,10 +9,12 @@ import pytest
 from scipy.stats import binomtest, fisher_exact, ranksums
 
 from planar_push.main import main
+from push_model.jobs import JobError
 from push_model.settings import SettingsError
 from push_study.experiments import grasp_selection, grasp_study, group_goals
 from push_study.study import StudyOptions, experiment, experiment_names, run_study, statistics_of
 from push_study.summary import aggregate, by_cell, known
+from push_study.team_run import Outcome, TeamTrace
 from push_study.uncertainty import UNCERTAINTIES
 from sim_bridge.worlds import world_kind
 
@@ -207,20 +209,13 @@ def test_a_statistic_does_not_hide_a_measure():
     assert known({"a": (np.float64(1.0), math.inf, np.int64(2))}) == {"a": [1.0, None, 2]}
 
 
-@pytest.mark.long
-def test_a_goal_that_is_reached_with_a_collision_is_no_success(tmp_path, monkeypatch):
-    """The same job twice; the second time something is said to have been touched in one tick."""
-    task = group_goals.GoalTask("open", 23, str(tmp_path), 3, 0, "planar", "none")
-    clean = group_goals.trial(task)
-    assert clean["success"] and clean["collision_ticks"] == 0 and clean["reason"] == ""
-    felt, ticks = group_goals.GroupWorld.felt, []
-
-    def once(self):
-        ticks.append(self.time)
-        return felt(self)[0], len(ticks) == 100
-
-    monkeypatch.setattr(group_goals.GroupWorld, "felt", once)
-    touched = group_goals.trial(task)
-    assert touched["position_error_m"] == clean["position_error_m"]
-    assert not touched["success"] and touched["collision_ticks"] == 1
-    assert "touched" in touched["reason"]
+@pytest.mark.parametrize(("ticks", "success"), [(0, True), (1, False), (200, False)])
+def test_a_goal_that_is_reached_with_a_collision_is_no_success(
+    ticks, success, tmp_path, monkeypatch
+):
+    trace = TeamTrace(collision_ticks=ticks)
+    ended = Outcome(1, JobError.NONE, "done", 60.0, 1.0, (1e-3, 0.01), trace, {})
+    monkeypatch.setattr(group_goals, "run_team", lambda *args: ended)
+    row = group_goals.trial(group_goals.GoalTask("open", 23, str(tmp_path), 3, 0, "planar", "none"))
+    assert row["success"] is success and row["collision_ticks"] == ticks
+    assert row["reason"] == ("" if success else f"collisions in {ticks} ticks")

@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -266,6 +267,41 @@ def test_a_wall_clock_that_leaps_changes_nothing(monkeypatch, undisturbed):
         monkeypatch.setattr(f"{module}.time", Leaping)
     assert run_once() == undisturbed
     assert leaps[0] > 1000
+
+
+@pytest.mark.long
+def test_a_process_that_is_stopped_for_15_s_ends_as_one_that_was_not(undisturbed, tmp_path):
+    """FAULTS 30: SIGSTOP in the middle of a push, SIGCONT; the result is equal to the bit."""
+    code = (
+        "from pathlib import Path\n"
+        "from push_study.graph_run import LockstepRun\n"
+        "from tests.system import test_lockstep\n"
+        "class Marked(LockstepRun):\n"
+        "    def spin_until(self, condition, limit, *rest):\n"
+        "        def watched():\n"
+        "            if self.observer.state.state_name == 'PUSHING':\n"
+        f"                Path({str(tmp_path)!r}, 'pushing').touch()\n"
+        "            return condition()\n"
+        "        return super().spin_until(watched, limit, *rest)\n"
+        "test_lockstep.LockstepRun = Marked\n"
+        "print(test_lockstep.run_once())\n"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", code], cwd=ROOT, stdout=subprocess.PIPE, text=True
+    )
+    try:
+        end = time.monotonic() + 240.0
+        while not (tmp_path / "pushing").exists():
+            assert process.poll() is None and time.monotonic() < end
+            time.sleep(0.02)
+        process.send_signal(signal.SIGSTOP)
+        time.sleep(15.0)
+        assert process.poll() is None  # it had not ended before it was stopped
+        process.send_signal(signal.SIGCONT)
+        out, _ = process.communicate(timeout=240.0)
+    finally:
+        process.kill()
+    assert process.returncode == 0 and out.split()[-1] == undisturbed
 
 
 def test_jumped_pose_is_not_chased(short):

@@ -230,6 +230,37 @@ def test_goal_ends_with_the_suite(domain, tmp_path):
     assert process.returncode == 1 and "ended before the job" in error
 
 
+@pytest.mark.long
+def test_goal_waits_for_an_owner_that_is_frozen_and_says_when_it_was_restarted(domain, tmp_path):
+    """Issue 18, row 18: 8 s without the supervisor, longer than it stays in the graph."""
+    events, said = [], []
+    launcher = launcher_of(tmp_path / "s", said=said, respawn=True, factor=3.0)
+    launcher.start()
+    try:
+        with Monitor(on_event=events.append) as monitor:
+            assert monitor.connect(40.0, lambda: not launcher.check())
+            monitor.send_goal(GOAL)
+            assert monitor.wait(40.0, lambda: monitor.pose[0] > -0.35)
+            (child,) = [c for c in launcher.children if c.name == "supervisor"]
+            child.process.send_signal(signal.SIGSTOP)
+            end = time.monotonic() + 8.0
+            while time.monotonic() < end:
+                monitor.spin()
+                assert monitor.poll() is None
+            child.process.send_signal(signal.SIGCONT)
+            result = monitor.follow(120.0)
+            assert result.success, result
+            assert [e.kind for e in events if e.kind == "silent"] == ["silent"]
+            monitor.send_goal((-0.3, 0.3, 0.0))
+            assert monitor.wait(20.0, lambda: monitor.state.state == JobState.PLANNING)
+            child.process.send_signal(signal.SIGKILL)
+            result = monitor.follow(60.0, lambda: launcher.check() is not None)
+            assert result.code is JobError.JOB_FORGOTTEN and "restarted" in result.reason, result
+    finally:
+        launcher.stop()
+    assert any("supervisor died (signal 9)" in text for text in said)
+
+
 def test_goal_follows_its_own_goal(domain, tmp_path):
     """A stranger's goals, refused or taken, are not mistaken for its own."""
     launcher = launcher_of(tmp_path / "s", factor=3.0)

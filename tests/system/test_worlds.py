@@ -331,8 +331,10 @@ def test_motion_capture_of_any_rate_has_exact_stamps(rate):
     with running(values, lambda b: [Commander(["d1"], ahead)]) as ((bridge, me), spinner):
         run_until(bridge, spinner, 0.5)
         stamps = [1_000_000_000 * f.header.stamp.sec + f.header.stamp.nanosec for f in me.frames]
-        assert stamps == [round(1e9 * (k + 1) / rate) for k in range(len(stamps))]
-        delay = int(np.ceil(0.01 * rate - 1e-9))
+        delay = int(np.ceil(0.01 * rate - 1e-9))  # ticks until one can show the first instant
+        ticks = np.arange(len(stamps)) + 1 + delay
+        assert stamps == [round(1e9 * (k / rate - 0.01)) for k in ticks]  # the latency is exact
+        assert bridge.applied_latency == pytest.approx((0.01, 0.0), abs=1e-9)
         # the last one may be under way
         assert len(stamps) in (round(0.5 * rate) - delay - k for k in (0, 1))
         assert bridge.unanswered == 0
