@@ -1,6 +1,6 @@
 """Mechanics of planar pushing: SE(2), shapes, friction, limit surfaces, stable pushes, kinematics.
 
-Pure numpy; imports nothing else of the project. SI units, radians, REP-103 axes.
+numpy, scipy and compiled kernels (numba); imports nothing else of the project. SI units, radians, REP-103 axes.
 """
 
 from push_model import se2

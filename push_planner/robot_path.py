@@ -7,13 +7,13 @@ import numpy as np
 
 from push_model import se2
 from push_model.arrays import Array
+from push_model.distance_field import DistanceField
+from push_model.grid_search import shortest_way
+from push_model.room import room_at, straightened
 from push_model.specs import RobotSpec
 from push_model.trajectory import Trajectory, concatenate, line, rotation
-from push_planner.distance_field import DistanceField
-from push_planner.grid_search import shortest_way
-from push_planner.room import room_at, straightened
+from push_model.widest_way import escape_radius
 from push_planner.settings import PlannerSettings
-from push_planner.widest_way import escape_radius
 
 
 class RobotPathError(IntEnum):

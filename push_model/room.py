@@ -15,7 +15,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from push_planner.distance_field import piece_square, square_at
+from push_model.distance_field import piece_square, square_at
 
 STEPS = np.array(
     [[0, 1], [1, 0], [0, -1], [-1, 0], [1, 1], [1, -1], [-1, 1], [-1, -1]]

@@ -10,8 +10,8 @@ import numba
 import numpy as np
 
 from push_model.arrays import Array
-from push_planner.bucket_queue import new_pool, pop, push
-from push_planner.room import STEPS, segment_keeps, slack_at
+from push_model.bucket_queue import new_pool, pop, push
+from push_model.room import STEPS, segment_keeps, slack_at
 
 _BLOCKED, _DONE, _OPEN, _SEEN = 255, 16, 10, 9  # states; 1 to 8: come here by that step
 _STRAIGHT, _DIAGONAL = 12, 17  # costs of the steps

@@ -10,8 +10,8 @@ from typing import Any
 import numba
 import numpy as np
 
-from push_planner.bucket_queue import new_pool, pop, push
-from push_planner.room import STEPS, corners, room_at, slack_at
+from push_model.bucket_queue import new_pool, pop, push
+from push_model.room import STEPS, corners, room_at, slack_at
 
 
 @numba.njit(cache=True)
