@@ -10,6 +10,7 @@ are left out.
 """
 
 import math
+from collections.abc import Generator
 
 import numpy as np
 from scipy.optimize import nnls
@@ -59,6 +60,10 @@ decide between motions that leave about the same part missing."""
 _LACKING = 0.2
 """Part of a motion's wrench that free places and walls may fail to supply: the wrench is then
 within asin(0.2) = 12 degrees of the wanted one, half the spacing of the directions."""
+_SLICE = 30
+"""Motions that are compared in a tick, 3 ms about."""
+Choice = Generator[None, None, tuple[Array, float] | None]
+"""Of a motion in slices: what it is, and how far [m] it leads."""
 
 
 class Escape:
@@ -80,6 +85,7 @@ class Escape:
         self._mark: tuple[float, Array] | None = None  # since when, and from where
         self._nearest = math.inf  # [m] of ways to go since then
         self._leaving: tuple[float, Array, Array, float] | None = None  # until, whence, which way
+        self._choice: Choice | None = None  # of a motion, being made
         corners = item.geometry.outline
         count = max(1, int(np.hypot(*np.diff(corners, axis=0).T).max() / _OUTLINE))
         part = np.linspace(0.0, 1.0, count, endpoint=False)[:, None, None]
@@ -99,7 +105,7 @@ class Escape:
 
     def reset(self) -> None:
         """Another target."""
-        self._mark, self._leaving = None, None
+        self._mark, self._leaving, self._choice = None, None, None
 
     def motion(self, now: float, pose: Array, wanted: Array, to_go: float | None) -> Array | None:
         """Motion ``(3,)`` of unit length, in the object's frame, that leads it off a wall; None
@@ -110,13 +116,17 @@ class Escape:
         now: [s]. pose ``(3,)`` of the object. wanted: its wanted twist ``(3,)`` in its frame.
             to_go: [m] sum of the robots' ways to their places; None if no robot is at the object.
         """
+        if self._choice is not None:
+            found = self._go_on()
+            if found is not None:
+                self._leaving = now + self._patience, pose, *found
         if self._leaving is not None:
             until, start, off, length = self._leaving
             if now < until and self.way(pose, start) < length:
                 return off
             self._leaving = self._mark = None
             if now >= until and wanted.any():
-                self._leave(now, pose, wanted)
+                self._choice = self._choose(pose, wanted)
                 return None
         if self._mark is None or to_go is None or not wanted.any():
             self._mark, self._nearest = (now, pose), math.inf
@@ -124,13 +134,19 @@ class Escape:
         if to_go < self._nearest - _NEARER or self._onward(pose, wanted) > self._budge:
             self._mark, self._nearest = (now, pose), to_go
         elif now - self._mark[0] > self._patience:
-            self._leave(now, pose, wanted)
+            self._choice, self._mark = self._choose(pose, wanted), None
         return None
 
-    def _leave(self, now: float, pose: Array, wanted: Array) -> None:
-        found, self._mark = self.direction(pose, wanted), None
-        if found is not None:
-            self._leaving = now + self._patience, pose, *found
+    def _go_on(self) -> tuple[Array, float] | None:
+        """A slice of the choice that is being made; what was chosen, once it is."""
+        assert self._choice is not None
+        try:
+            next(self._choice)
+        except StopIteration as end:
+            self._choice = None
+            found: tuple[Array, float] | None = end.value
+            return found
+        return None
 
     def _onward(self, pose: Array, wanted: Array) -> float:
         """Progress [m] since the watch began, along the wanted twist; a turn counts by the radius
@@ -147,13 +163,25 @@ class Escape:
         """A motion ``(3,)`` of unit length in the object's frame, and its length [m]; a turn counts
         by the radius of friction. None if every motion has been tried at this place; the next call
         starts again with all of them. wanted: twist ``(3,)`` in the object's frame, not zero."""
+        choice = self._choose(pose, wanted)
+        while True:
+            try:
+                next(choice)
+            except StopIteration as end:
+                found: tuple[Array, float] | None = end.value
+                return found
+
+    def _choose(self, pose: Array, wanted: Array) -> Choice:
+        """The same in slices, so that no tick waits for all of it."""
         if self._stuck is None or self.way(pose, self._stuck) > _SAME:
             self._stuck, self._tried = pose, []
-        motions = self._possible(pose)
+        motions = yield from self._possible(pose)
         motions = [m for m in motions if all(m @ other < _UNLIKE for other in self._tried)]
         goal = wanted * self._scale / np.linalg.norm(wanted * self._scale)
         best, found = math.inf, None
-        for motion in motions:
+        for k, motion in enumerate(motions):
+            if k % _SLICE == 0:
+                yield
             for length in _LENGTHS:
                 after = screw_poses(pose, length * motion / self._scale, np.ones(1))[0]
                 if self._in_walls(after):
@@ -172,7 +200,7 @@ class Escape:
         turn = abs(se2.wrap(float(pose[2] - start[2])))
         return math.hypot(*(pose - start)[:2]) + float(self._scale[2]) * turn
 
-    def _possible(self, pose: Array) -> list[Array]:
+    def _possible(self, pose: Array) -> Generator[None, None, list[Array]]:
         """Motions that robots at free places can push, with the reactions of walls along which the
         object slides."""
         pushes = self._pushes(pose)
@@ -182,7 +210,9 @@ class Escape:
         length = np.linalg.norm(motions, axis=1)
         motions = motions[length > _LEAST] / length[length > _LEAST, None]
         found = []
-        for motion in motions:
+        for k, motion in enumerate(motions):
+            if k % (2 * _SLICE) == 0:
+                yield
             back = -into[:, motion @ into > -_SLIDES]
             columns = np.hstack([pushes, back])
             if self._lacking(motion / self._scale, columns) < _LACKING:
