@@ -324,7 +324,7 @@ def shortest_way(
         return result
 
     # On a diagonal between points with that much, d^2 is at least that of the middle.
-    least = min(wanted, need + capsules[:, 4].min(initial=np.inf))
+    least = min(wanted, need + capsules[:, -1].min(initial=np.inf))
     for step in (stride, 1) if stride > 1 else (1,):
         if step == 1 and stride > 1:
             # Any point of a way has a coarse one so near: if those part, there is none at all.

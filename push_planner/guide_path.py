@@ -26,7 +26,7 @@ from push_model.shapes import Shape
 from push_model.widest_way import escape_radius, widest_clearance
 from push_planner.settings import PlannerSettings
 
-_NO_CIRCLES: Array = np.zeros((0, 3))
+_NO_CIRCLES: Array = np.zeros((0, 5))
 _NO_ENDS: Array = np.zeros((0, 4))
 _LONGER = 1.05  # times the way on the lattice: a path of samples that long has missed that way
 _NARROWER = 0.98  # of the widest clearance, to leave samples some room
