@@ -1,4 +1,4 @@
-"""Benchmarks: speed beside rivals, and the physics against theory. ``planar-push bench``."""
+"""Benchmarks: speed against other solvers, and physics against theory. ``planar-push bench``."""
 
 import importlib
 import json

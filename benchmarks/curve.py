@@ -1,4 +1,4 @@
-"""Push-curve optimisation beside SLSQP and IPOPT on random pairs of poses."""
+"""Push-curve optimisation against SLSQP and IPOPT on random pairs of poses."""
 
 import math
 from typing import Any
@@ -11,11 +11,11 @@ from benchmarks.measure import at_least, at_most, quantiles, thread_times
 from push_planner import PushCurve, shortest_push_curve
 
 LOW, HIGH, PAIRS, SAMPLES = -4.0, 5.0, 500, 50
-TOLERANCE = 1.02  # of a limit; rivals that sample 50 points exceed it a little in between
+TOLERANCE = 1.02  # of a limit; solvers that sample 50 points exceed it a little in between
 
 
 def pairs(count: int = PAIRS) -> list[np.ndarray]:
-    """End poses seen from the start, roughly ahead of it."""
+    """End poses relative to the start, roughly ahead of it."""
     random = np.random.default_rng(0)
     result = []
     for _ in range(count):

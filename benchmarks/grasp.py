@@ -1,4 +1,4 @@
-"""Grasp-task compatibility and indices, one grasp at a time and many at once, beside LP solvers."""
+"""Grasp-task compatibility and indices, of one grasp and of many at once, against LP solvers."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""A tick of a group of five, and its force distribution beside QP solvers of the same."""
+"""A tick of a group of five, and its force distribution against QP solvers."""
 
 import math
 from typing import Any
@@ -20,7 +20,7 @@ from push_model.grasp import grasp_matrix
 from push_scenario.bodies import load_object, load_robot
 
 TICKS, PROGRAMMES, ROBOTS = 3000, 500, 5
-_SQUARES = 1e-3  # weight of forces beside the wrench, as in distribute
+_SQUARES = 1e-3  # weight of forces relative to the wrench, as in distribute
 
 
 def _ticks() -> tuple[Array, int]:
@@ -56,7 +56,7 @@ def _programmes() -> list[tuple[Array, Contacts]]:
 
 
 def _matrices(contacts: Contacts, length: float) -> tuple[Array, Array]:
-    """The wrench over the shares of the cones' edges, and the edges."""
+    """The map from the forces along the cones' edges to the wrench, and the edges."""
     n = len(contacts.points)
     spread = np.zeros((2 * n, 2 * n))
     for i, normal in enumerate(contacts.normals):

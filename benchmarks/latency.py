@@ -11,7 +11,8 @@ from rclpy.signals import SignalHandlerOptions
 
 from benchmarks.measure import at_most
 from push_bringup.launcher import Child, Launcher
-from push_bringup.systems import MODULES, single
+from push_bringup.node_kinds import MODULES
+from push_bringup.systems import single
 from push_model import line, unicycle_step
 from push_msgs.action import FollowTrajectory
 from push_msgs.msg import Poses

@@ -1,7 +1,7 @@
-"""What the graph costs a tick in lockstep, beside the physics, at 1, 20, 200 and 1000 bodies.
+"""Cost of the graph per tick in lockstep, beside the physics, at 1, 20, 200 and 1000 bodies.
 
-The graph is the bridge and a commander that answers every frame by arrays, without any mathematics;
-the physics is what the world itself takes, in the same run. Thread CPU time.
+The graph is the bridge and a commander that answers every frame with arrays, without any control
+law. The physics is the time of the world itself in the same run. Thread CPU time.
 """
 
 import math
@@ -28,12 +28,12 @@ from sim_bridge.node import BridgeNode
 from sim_bridge.pybullet_world import PyBulletWorld
 
 BOUNDS = {1: 0.7, 20: 1.0, 200: 2.0, 1000: 3.0}
-"""[ms] of the graph a tick, by the number of robots; that for 200 lies between its neighbours."""
+"""[ms] bound of the graph's time per tick, by the number of robots; 200 is interpolated."""
 _TICKS = {1: 1000, 20: 500, 200: 100, 1000: 30}
 
 
 class Commander(Node):
-    """Answers a frame with the same velocity for everybody it names."""
+    """Answers a frame with the same velocity for every robot in it."""
 
     def __init__(self, robots: list[str]) -> None:
         super().__init__("commander")
@@ -55,7 +55,7 @@ class Commander(Node):
 
 
 def crowd(count: int) -> Scenario:
-    """An e-puck, twenty of them, or so many discs, apart from each other."""
+    """One e-puck, twenty, or a number of discs, apart from each other."""
     columns = math.ceil(math.sqrt(count))
     side = 0.13 * columns + 1.0
     corner = [-side / 2.0 + 0.4, -side / 2.0 + 0.4]
@@ -75,7 +75,7 @@ def crowd(count: int) -> Scenario:
 
 
 def timed(function: Callable[..., Any], spent: list[float]) -> Callable[..., Any]:
-    """The function, and its thread CPU time added up."""
+    """The function, wrapped to sum its thread CPU time."""
 
     def wrapper(*arguments: Any, **keywords: Any) -> Any:
         started = time.thread_time()
@@ -88,7 +88,7 @@ def timed(function: Callable[..., Any], spent: list[float]) -> Callable[..., Any
 
 
 def graph_cost(count: int) -> tuple[float, float]:
-    """[ms] of the graph and of the world a tick."""
+    """[ms] per tick of the graph and of the world."""
     scenario = crowd(count)
     bridge = BridgeNode(scenario, autostart=False)
     spinner = Spinner([bridge, Commander(list(scenario.robots))])
@@ -111,7 +111,7 @@ def graph_cost(count: int) -> tuple[float, float]:
             spinner.until(lambda until=until: bridge.tick >= until, 120.0)  # type: ignore[misc]
             total, ticks = time.thread_time() - started, bridge.tick - begin
             costs.append(((total - spent[0]) / ticks, spent[0] / ticks))
-        if bridge.lockstep_timeouts:
+        if bridge.unanswered:
             raise RuntimeError("a tick was not answered")
         graph, physics = np.median(costs, axis=0)
         return 1e3 * float(graph), 1e3 * float(physics)
@@ -120,7 +120,7 @@ def graph_cost(count: int) -> tuple[float, float]:
 
 
 def whole_graph(seconds: float) -> tuple[float, float]:
-    """Sim time over thread CPU time in the middle of a push: all nodes, and the bare physics."""
+    """Simulated over thread CPU time in the middle of a push: all nodes, and the bare physics."""
     scenario = load_scenario("env1-target1")
     factors: dict[str, list[float]] = {"graph": [], "bare": []}
     with LockstepRun(scenario, quiet=True) as graph:
@@ -138,7 +138,7 @@ def whole_graph(seconds: float) -> tuple[float, float]:
         ) as bare:
             bare.command("epuck1", 0.07, 0.0)
             bare.step(500)
-            for _ in range(4):  # in turn, so that a busy machine slows both
+            for _ in range(4):  # alternating, so that a busy machine slows both
                 for name in ("graph", "bare"):
                     started = time.thread_time()
                     if name == "graph":
@@ -154,7 +154,7 @@ def whole_graph(seconds: float) -> tuple[float, float]:
 
 
 def run(seconds: float = 20.0) -> dict[str, Any]:
-    """The table of costs, and the whole single-robot system beside its bare physics."""
+    """The table of costs, and the whole single-robot system against its bare physics."""
     prepare_environment()
     claim_domain()
     costs, bounds = {}, {}

@@ -1,4 +1,4 @@
-"""Timing: thread CPU time, medians and p99; bounds that are either held or not."""
+"""Timing by thread CPU time; medians, p99, and bounds."""
 
 import time
 from collections.abc import Callable
@@ -20,15 +20,15 @@ def thread_times(call: Callable[[Any], Any], inputs: list[Any]) -> tuple[np.ndar
 
 
 def quantiles(times: np.ndarray) -> str:
-    """Median and p99 [us] for people."""
+    """Median and p99 [us] as text."""
     return f"median {1e6 * np.median(times):8.1f} us   p99 {1e6 * np.percentile(times, 99):9.1f} us"
 
 
 def at_most(value: float, limit: float) -> Bound:
-    """A bound from above."""
+    """Check an upper bound."""
     return float(value), f"<= {limit:g}", bool(value <= limit)
 
 
 def at_least(value: float, limit: float) -> Bound:
-    """A bound from below."""
+    """Check a lower bound."""
     return float(value), f">= {limit:g}", bool(value >= limit)

@@ -1,9 +1,9 @@
 """One LTV-MPC step by QP backend, easy and hard cases, against a reference solved to 1e-10.
 
-The hard cases are solved with contact forces too (section 2.4.6): "forces". Every rival is measured
-with the same rows and the same warm start as ours: rows as they are needed, checked and written by
-the same compiled code, and every row at once; each starts from what it found the tick before, and
-anew where a closed loop begins.
+The hard cases are also solved with contact forces (section 2.4.6): "forces". Every solver gets the
+same rows and the same warm start as ours: once with row generation by the same compiled code, and
+once with every row. Each starts from its solution of the previous tick, and cold where a closed
+loop begins.
 """
 
 from collections.abc import Callable, Sequence
@@ -39,7 +39,7 @@ LOOPS, TICKS = 12, 50  # closed loops, and ticks of each; 1 in 50 is a cold star
 
 @dataclass(frozen=True)
 class Kind:
-    """What is measured: a controller with its contact, in easy or hard loops."""
+    """A case: a controller with its contact, in easy or hard loops."""
 
     controller: type[LtvMpc]
     settings: Any
@@ -47,12 +47,12 @@ class Kind:
     hard: bool
 
     def make(self, solver: Any = None) -> LtvMpc:
-        """A controller; its own solver where none is given."""
+        """A controller; with its own solver if none is given."""
         return self.controller(self.settings, DRIVE, solver)
 
 
 def kinds() -> dict[str, Kind]:
-    """By name."""
+    """The cases by name."""
     scenario = load_scenario("short")
     robot, item = scenario.robot()[1], scenario.object()[1]
     side = push_sides(robot, item, 1.0)[0]
@@ -65,7 +65,7 @@ def kinds() -> dict[str, Kind]:
 
 
 class WrittenOut:
-    """Our active set given every row as a dense one, as the rivals are."""
+    """Our active set with every row written out, as for the other solvers."""
 
     def __init__(self) -> None:
         self._solver = ActiveSetBackend()
@@ -79,7 +79,7 @@ class WrittenOut:
 
 
 class Nothing:
-    """Solves nothing: what a step costs beside the solver."""
+    """Solves nothing, to measure the cost of a step without the solver."""
 
     def solve(self, qp: Qp) -> QpSolution:
         return QpSolution(np.zeros(len(qp.f)), True, "nothing")
@@ -123,8 +123,8 @@ class Reference10:
 def cases(kind: Kind) -> list[Any]:
     """Consecutive ticks of closed loops at 100 Hz: error, reference, obstacles.
 
-    Easy: near the reference, obstacles out of the way. Hard: from far off, on a bend near the
-    curvature limit, obstacles close along the way on both sides. The obstacles are 20 each time.
+    Easy: near the reference, obstacles far away. Hard: far from the reference, on a bend near the
+    curvature limit, obstacles close on both sides. There are always 20 obstacles.
     """
     hard = kind.hard
     random = np.random.default_rng(7 if hard else 3)
@@ -212,9 +212,8 @@ def run() -> dict[str, Any]:
 
 
 def _interleaved(kind: Kind, inputs: list[Any]) -> dict[str, np.ndarray]:
-    """CPU time [s] of each step by backend; they take turns, a closed loop each.
-
-    So that a machine that is slower for a while is slower for all. OSQP has three loops' turns.
+    """CPU time [s] of each step by backend. Backends alternate, one closed loop each, so that a
+    temporarily slow machine slows all of them. OSQP runs three loops.
     """
     controllers = {name: kind.make(make()) for name, make in BACKENDS.items()}
     times: dict[str, list[np.ndarray]] = {name: [] for name in BACKENDS}
@@ -238,7 +237,7 @@ def _bounds(result: dict[str, Any]) -> dict[str, Any]:
     easy, hard = result["easy active set"], result["hard active set"]
 
     def ratio(name: str, quantile: str = "median_s", of: Sequence[str] = ("easy", "hard")) -> float:
-        """The least of them."""
+        """The smallest value."""
         return min(
             result[f"{kind} {name}"][quantile] / result[f"{kind} active set"][quantile]
             for kind in of

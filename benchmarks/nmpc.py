@@ -1,7 +1,7 @@
-"""The wheel-slip NMPC (2.14) beside IPOPT: time of a solve and cost of what is found.
+"""The wheel-slip NMPC (2.14) against IPOPT: solve time and cost of the solution.
 
-Both solve the same programme from the same start: along a closed loop, with the last solution,
-and from random states, with none.
+Both solve the same programmes from the same start: along a closed loop from the last solution, and
+from random states without one.
 """
 
 import time
@@ -17,7 +17,7 @@ from push_model.limit_surface import GRAVITY
 from push_mpc.wheel_slip_nmpc import WheelSlipNmpc, WheelSlipSettings, beside
 from push_scenario.scenario import load_scenario
 
-_SMOOTH, _NEWTON = 0.1, 0.1  # as in push_mpc/torque_prediction.py, written down anew
+_SMOOTH, _NEWTON = 0.1, 0.1  # as in push_mpc/torque_prediction.py, written independently
 
 
 class Ipopt:
@@ -102,7 +102,7 @@ class Ipopt:
 
 
 def random_cases(count: int, seed: int = 1) -> list[tuple[Any, Any]]:
-    """States beside references of any speed and turn."""
+    """Random states near references of random speed and turn rate."""
     random = np.random.default_rng(seed)
     cases = []
     for _ in range(count):

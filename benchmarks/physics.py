@@ -22,7 +22,7 @@ DISC = load_robot("disc")
 
 
 def advance(world: Any, seconds: float) -> None:
-    """Step a world by so much."""
+    """Step a world by a duration."""
     world.step(round(seconds / world.time_step))
 
 
@@ -111,7 +111,7 @@ def wheels(kind: World, robot: RobotSpec) -> tuple[float, float]:
 
 def jam(kind: World) -> tuple[float, float]:
     """A plate between a wall and a disc that presses on it: creep [mm] in 5 s; force at the wall
-    over the disc's, the rest of which the floor takes."""
+    over that of the disc (the floor takes the rest)."""
     room = EnvironmentSpec((2.0, 2.0), resolution=0.02)
     plate = replace(load_object("plate_square"), contact_friction=0.3)
     poses = {"d": np.array([1.0 - 0.35 - 0.0502, 0.03, 0.0]), "p": np.array([0.8249, 0.0, 0.0])}
@@ -129,7 +129,7 @@ def jam(kind: World) -> tuple[float, float]:
 
 
 def work(kind: World) -> float:
-    """Work of two discs on a plate that they turn and push, over what the floor takes of it."""
+    """Work of two discs that turn and push a plate, over the friction work of the floor."""
     plate = load_object("plate_hexagon")
     surface = plate.limit_surface()
     strong = replace(DISC, drive=replace(DISC.drive, max_force=20.0))

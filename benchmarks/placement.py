@@ -1,4 +1,4 @@
-"""Placements for tasks: against far finer grids, and against IPOPT from the thesis's start."""
+"""Placements for tasks, against finer exhaustive grids and IPOPT from the thesis's start."""
 
 import time
 from typing import Any
@@ -26,7 +26,7 @@ RADIUS = 0.05
 
 
 def run() -> dict[str, Any]:
-    """Cost over the exhaustive grid's best, times, and where the local method ends."""
+    """Cost relative to the exhaustive grid's best, times, and results of the local method."""
     rows = []
     for shape in SCENARIOS:
         for name, trajectory in trajectories().items():

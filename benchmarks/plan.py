@@ -1,8 +1,8 @@
 """Plans: of the scenarios that ship with a goal, and of random problems, also among clutter.
 
-What can be solved at all is what an exhaustive search solves: the same pushes and clearances, with
-thousands of poses all over the map, many more pushes out of the start and into the goal, and a
-many times the effort. It is asked only where the planner has no plan.
+A problem counts as solvable if an exhaustive search solves it: with the same pushes and clearances,
+thousands of poses all over the map, many more pushes out of the start and into the goal, and many
+times the effort. The exhaustive search runs only where the planner has no plan.
 
     python -m benchmarks.plan --problems 300 --worlds 6 --seed 1
 """
@@ -39,14 +39,14 @@ class Outcome:
     first: float
     final: float
     costs: tuple[float, ...]
-    bound: float  # [m] that no plan can cost less than
+    bound: float  # [m] lower bound of the cost of a plan
     why: str = ""
 
 
 def problems(
     planner: PushPlanner, count: int, seed: int
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Start and goal poses ``(3,)`` anywhere on the map where the object keeps its distance."""
+    """Random start and goal poses ``(3,)`` on the map at which the object keeps its clearance."""
     x0, x1, y0, y1 = planner.scene.field.grid.extent
 
     def draw(random: np.random.Generator) -> np.ndarray:
@@ -62,7 +62,7 @@ def problems(
 
 
 def attempt(planner: PushPlanner, start: np.ndarray, goal: np.ndarray) -> Outcome:
-    """Plan, and note every plan on the way."""
+    """Plan, and record every intermediate plan."""
     bound = planner.lower_bound(start, goal)
     began = time.thread_time()
     first, costs, best = np.inf, [], None
@@ -80,7 +80,7 @@ def attempt(planner: PushPlanner, start: np.ndarray, goal: np.ndarray) -> Outcom
 
 
 def exhaustive(planner: PushPlanner, start: np.ndarray, goal: np.ndarray, seed: int) -> float:
-    """Cost [m] of the plan that a search finds that spares no effort; inf when it finds none."""
+    """Cost [m] of the plan of an exhaustive search; inf if it finds none."""
     scene = planner.scene
     start, goal = scene.item.mass_pose(start), scene.item.mass_pose(goal)
     random = np.random.default_rng(seed)
@@ -191,7 +191,7 @@ def scenarios() -> tuple[dict[str, Any], dict[str, Bound]]:
             PlannerSettings(), scenario.grid, scenario.robot()[1], scenario.object()[1]
         )
         start = next(iter(scenario.objects.values()))[1]
-        attempt(planner, start, scenario.goal)  # compiled code is loaded
+        attempt(planner, start, scenario.goal)  # load the compiled code
         outcome = attempt(planner, start, scenario.goal)
         if not outcome.costs:
             print(f"  {name}: no plan: {outcome.why}")
@@ -215,7 +215,7 @@ def scenarios() -> tuple[dict[str, Any], dict[str, Bound]]:
 
 
 def run(count: int = PROBLEMS, worlds: int = WORLDS, seed: int = SEED) -> dict[str, Any]:
-    """CPU time to plans in a warm process, and whether there are any."""
+    """CPU time to plans in a warm process, and the fraction of solved problems."""
     result, bounds = scenarios()
     scenario = load_scenario("env1-target1")
     robot, item = scenario.robot()[1], scenario.object()[1]

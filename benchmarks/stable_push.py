@@ -1,6 +1,6 @@
-"""Stable-push limits in simulation: just inside sticks, just outside slips, for many polygons.
+"""Stable-push limits in simulation: no slip just inside, slip just outside, for many polygons.
 
-The pusher is the e-puck made heavy, so that its wheels roll whatever the object does.
+The pusher is a heavy e-puck, so that its wheels do not slip.
 """
 
 import math

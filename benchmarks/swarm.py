@@ -1,4 +1,4 @@
-"""Coverage beside libraries that make the same cells, and where a swarm's tick goes."""
+"""Coverage against libraries that build the same cells, and the time of a swarm's tick."""
 
 import math
 from typing import Any
@@ -18,7 +18,7 @@ COUNTS = (8, 20, 100, 1000)
 REGION = np.array([[-1.5, -1.0], [1.5, -1.0], [1.5, 1.0], [-1.5, 1.0]])
 _LAYOUTS = {8: 300, 20: 300, 100: 100, 1000: 20}
 _BOX = shapely.Polygon(REGION)
-_SPLIT = 3  # times that triangles are cut in four before the rule of degree five
+_SPLIT = 3  # times that triangles are divided into four before the rule of degree five
 _A, _B = (6.0 - math.sqrt(15.0)) / 21.0, (6.0 + math.sqrt(15.0)) / 21.0
 _RULE = np.array(
     [[1 / 3, 1 / 3, 1 / 3]]
@@ -113,7 +113,7 @@ def _coverage(results: dict[str, Any], bounds: dict[str, Any]) -> None:
 
 
 def _ticks(results: dict[str, Any]) -> None:
-    """Whole ticks of a job with the crescent, robots anywhere about the object."""
+    """Whole ticks of a job with the crescent law, robots at random around the object."""
     item, robot = load_object("swarm_square"), load_robot("epuck_ring")
     for count in COUNTS:
         half = max(2.0, 0.15 * math.sqrt(count))

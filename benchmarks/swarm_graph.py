@@ -1,7 +1,7 @@
-"""Where the time of a tick goes with a swarm in the whole graph, in lockstep, while it pushes.
+"""Time of a tick of a pushing swarm in the whole graph, in lockstep.
 
-Twenty e-pucks with wheels in both worlds, and a thousand discs. Thread CPU time; the job's own
-mathematics is told apart from the graph that carries it.
+Twenty e-pucks in both worlds, and a thousand discs. Thread CPU time, separately for the job and for
+the graph around it.
 """
 
 import time
@@ -20,7 +20,7 @@ _PARTS = 5
 
 
 def wheels(world: str) -> Scenario:
-    """Twenty e-pucks about the square."""
+    """Twenty e-pucks around the square."""
     values = {
         "environment": {"size": [4.0, 4.0]},
         "robots": {
@@ -38,24 +38,25 @@ def wheels(world: str) -> Scenario:
 
 
 def discs() -> Scenario:
-    """A thousand discs anywhere about the square."""
+    """A thousand discs at random around the square."""
     scenario = load_scenario("discs1000")
     return scenario.settings("bridge", world="planar")
 
 
 def budget(scenario: Scenario, goal: Any, ticks: int) -> dict[str, float]:
-    """[ms] a tick: world, job, the swarm's node beside its job, and the rest of the graph."""
+    """[ms] per tick: world, job, rest of the swarm node, and rest of the graph."""
     with LockstepRun(scenario, system="swarm", quiet=True) as run:
         run.start()
         run.teams[""].send_goal(np.array(goal))
         run.spin_until(lambda: run.observer.state.state_name == "PUSHING", 60.0)
-        run.observer.look_away()  # an instrument, not a part of the graph
+        run.observer.look_away()  # a measuring instrument, not a part of the graph
         spent = {name: [0.0] for name in ("world", "job", "node")}
         world: Any = run.bridge.world
         for name in ("step", "poses", "command_all"):
             setattr(world, name, timed(getattr(world, name), spent["world"]))
         node: Any = run.controller
-        node.job.step = timed(node.job.step, spent["job"])
+        job = node.method.job
+        job.step = timed(job.step, spent["job"])
         node._poses.take = timed(node._poses.take, spent["node"])
         parts = []
         for _ in range(_PARTS):
@@ -70,14 +71,14 @@ def budget(scenario: Scenario, goal: Any, ticks: int) -> dict[str, float]:
             parts.append(np.array([physics, job, whole - job, total - physics - whole]) / done)
         if not node.busy:
             raise RuntimeError("the job ended before the measurement did")
-        if run.bridge.lockstep_timeouts:
+        if run.bridge.unanswered:
             raise RuntimeError("a tick was not answered")
     table = 1e3 * np.median(parts, axis=0)
     return dict(zip(("world", "job", "node", "rest"), map(float, table), strict=True))
 
 
 def run() -> dict[str, Any]:
-    """The tables, and what the graph itself takes."""
+    """The tables, and the time of the graph itself."""
     prepare_environment()
     claim_domain()
     results, bounds = {}, {}

@@ -1,4 +1,4 @@
-"""Speed of the planar world beside PyBullet's: discs that press on a plate, walls about them."""
+"""Speed of the planar world against PyBullet: discs that press on a plate between walls."""
 
 import math
 import time
@@ -20,7 +20,7 @@ _PLATE = 0.25  # [m] circumradius
 
 
 def crowd(make: Callable[..., Any], count: int, bumper: float) -> Any:
-    """A world of so many discs behind a hexagonal plate, three sides of their arena near."""
+    """A world of discs behind a hexagonal plate, with three walls of the arena near."""
     disc = load_robot("disc")
     drive = replace(disc.drive, max_force=1.9)
     disc = replace(disc, drive=drive, bumper=replace(disc.bumper, radius=bumper))
@@ -40,7 +40,7 @@ def crowd(make: Callable[..., Any], count: int, bumper: float) -> Any:
 
 
 def pace(make: Callable[..., Any], count: int, bumper: float, seconds: float) -> float:
-    """Simulated seconds a second of CPU, contacts added up, commands and poses every tick."""
+    """Simulated seconds per CPU second, with contacts, commands and poses in every tick."""
     random = np.random.default_rng(1)
     with crowd(make, count, bumper) as world:
         names = [n for n in world.names if n != "plate"]
@@ -59,7 +59,7 @@ def pace(make: Callable[..., Any], count: int, bumper: float, seconds: float) ->
 
 
 def run() -> dict[str, Any]:
-    """Pace of both, and their ratio."""
+    """Pace of both worlds, and their ratio."""
     result: dict[str, Any] = {"bounds": {}}
     pace(PlanarWorld, 2, 0.05, 0.1)
     for count, bumper, seconds, limit in (

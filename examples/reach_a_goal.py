@@ -1,4 +1,4 @@
-"""Start a suite, one process a node, and have a box brought to a pose. In real time, or faster."""
+"""Start a suite, one process per node, and bring a box to a pose, in real time or faster."""
 
 import sys
 
@@ -6,7 +6,7 @@ from push_bringup.suite import Suite
 
 
 def main(factor: float = 1.0) -> bool:
-    """Whether the box got there."""
+    """Whether the box reached the pose."""
     slowly = {"planner": {"push_speed": 0.06}}
     with Suite("short", parameters=slowly, factor=factor) as suite:
         result = suite.reach(0.1, 0.04, 0.1)

@@ -1,4 +1,4 @@
-"""The same in lockstep: all nodes in this process, as fast as it goes, repeatable to the bit."""
+"""The same in lockstep: all nodes in this process, as fast as possible, repeatable to the bit."""
 
 import sys
 
@@ -7,7 +7,7 @@ from push_study.graph_run import LockstepRun
 
 
 def main() -> bool:
-    """Whether the box got there."""
+    """Whether the box reached the pose."""
     scenario = load_scenario("short").settings("planner", push_speed=0.06)
     with LockstepRun(scenario, quiet=True) as run:
         run.start()

@@ -1,4 +1,4 @@
-"""Two teams at once, recorded, with events by callback; then what the bag says."""
+"""Two teams at once, recorded, with events by callback; then read the bag."""
 
 import sys
 import tempfile
@@ -11,12 +11,12 @@ from push_view.report import final_error
 
 
 def tell(event: JobEvent) -> None:
-    """Called while the suite is waited for."""
+    """Called while the script waits for the suite."""
     print(f"{event.stamp:6.2f} s  {event.team:6s} {event.state:12s} {event.reason}")
 
 
 def main(factor: float = 1.0) -> bool:
-    """Whether both boxes got to their goals."""
+    """Whether both boxes reached their goals."""
     with tempfile.TemporaryDirectory() as folder:
         bag = Path(folder) / "bag"
         with Suite("two-singles", record=bag, factor=factor, on_event=tell) as suite:

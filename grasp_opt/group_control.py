@@ -110,7 +110,7 @@ class GroupController:
         """radius: [m] of the robots' rings. friction: of the contacts, as believed."""
         self.settings = settings or GroupControlSettings()
         self.outline, self.friction, self.surface = outline, friction, surface
-        self._radius = radius
+        self._radius, self.ways = radius, ways
         self.places = outline.at(ways).centres(radius)
 
     def meet(self, pose: Array, ahead: Array, robots: Array) -> tuple[Array, Array]:

@@ -116,6 +116,15 @@ class GroupJob:
         """Believe in all robots again: the world was reset, or somebody saw to them."""
         self.dead = ()
 
+    def believe(self, item: ObjectSpec, robot: RobotSpec) -> None:
+        """Go on with another object and robot type than before; a push under way too."""
+        if item == self._item and robot == self._robot:
+            return
+        self._item, self._robot = item, robot
+        self._outline = ContactOutline(item.geometry)
+        if self._push is not None:
+            self._push.believe(item, robot)
+
     def planned(self, plan: GroupPlan) -> None:
         """The answer to a request."""
         if self.request is None:

@@ -1,20 +1,18 @@
 """Plans and states of a group as messages, and back. Knows ROS."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from grasp_opt.contact_outline import Contacts
-from grasp_opt.group_push import GroupStep
 from grasp_opt.object_trajectory import ObjectTrajectory, sampled
 from grasp_opt.placement import Placement
 from grasp_opt.sequencing import Move
 from grasp_opt.step_planner import GroupPlan
 from push_model import se2
-from push_model.arrays import Array
 from push_model.specs import ObjectSpec
-from push_msgs.msg import GroupMove, GroupStatus
+from push_msgs.msg import GroupMove
 from push_msgs.msg import GroupPlan as PlanMessage
 from push_ros.conversions import time_to_ros
 from push_ros.validation import FRAME, InvalidMessage, finite
@@ -103,29 +101,3 @@ def trajectory_from_ros(message: Any, item: ObjectSpec) -> ObjectTrajectory:
         return sampled(arrays[0], np.column_stack([centres, pose[:, 2]]))
     except ValueError as error:
         raise InvalidMessage(str(error)) from None
-
-
-def status_to_ros(
-    stamp: Any,
-    item: str,
-    names: Sequence[str],
-    step: GroupStep,
-    pose: Array,
-    figures: Mapping[str, float],
-    dead: Sequence[str],
-) -> GroupStatus:
-    """Of a tick of a push: names of the pushers; pose ``(3,)`` of the centre of mass."""
-    message = GroupStatus(object=item, pushers=list(names), dead=list(dead), **figures)
-    message.header.frame_id, message.header.stamp = FRAME, stamp
-    command = step.command
-    if command is not None:
-        turn = se2.rotation_matrix(float(pose[2]))
-        message.contact_x, message.contact_y = se2.transform(
-            pose, command.contacts.points
-        ).T.tolist()
-        message.normal_x, message.normal_y = (command.contacts.normals @ turn.T).T.tolist()
-        message.force_x, message.force_y = (command.forces @ turn.T).T.tolist()
-        wrench = turn @ command.wrench[:2]
-        message.wrench_x, message.wrench_y = float(wrench[0]), float(wrench[1])
-        message.wrench_torque, message.lacking = float(command.wrench[2]), float(command.lacking)
-    return message

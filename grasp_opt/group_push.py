@@ -108,6 +108,18 @@ class GroupPush:
         self.time = 0.0  # [s] along the trajectory
         self._moved_on = 0.0  # [s] when it last did
 
+    def believe(self, item: ObjectSpec, robot: RobotSpec) -> None:
+        """Push on with what is believed of the object and the robots now."""
+        self._drive = robot.differential
+        self.controller = GroupController(
+            ContactOutline(item.geometry),
+            self.controller.ways,
+            item.contact_friction,
+            item.limit_surface(),
+            robot.footprint_radius,
+            self.controller.settings,
+        )
+
     def starts(self, pose: Array, off: float) -> Array:
         """``(n, 3)`` poses from which robots come to the object at a pose ``(3,)``, so far [m] from
         where they touch it."""

@@ -16,12 +16,14 @@ from grasp_opt.group_messages import plan_to_ros, trajectory_from_ros
 from grasp_opt.placement import PlacementSettings
 from grasp_opt.sequencing import NoStep
 from grasp_opt.step_planner import GroupPlan, StepPlanner, StepSettings, TooFew
+from push_model.belief import Belief
 from push_model.occupancy import OccupancyGrid as Grid
 from push_model.settings import SettingsError
 from push_model.trajectory import Trajectory
 from push_msgs.action import PlanGroupPush
 from push_msgs.msg import GroupPlan as PlanMessage
 from push_ros.actions import GoalServer
+from push_ros.belief_feed import BeliefFeed
 from push_ros.conversions import circles_from_ros, path_to_ros
 from push_ros.diagnostics import Diagnostics
 from push_ros.map_feed import MapFeed
@@ -71,10 +73,13 @@ class OptimizerNode(Node):
         self._planner: StepPlanner | None = None
         self.plans = self.failures = 0
         self.last_time = 0.0
+        self.planning_time = 0.0
+        """[s] CPU time that planning has taken so far."""
         self._diagnostics = Diagnostics(self, names, self._state)
         self._publisher = self.create_publisher(PlanMessage, names.team("group_plan"), LATCHED)
         self._path_publisher = self.create_publisher(Path, names.team("push_path"), LATCHED)
         MapFeed(self, names, self._diagnostics, self._take_map)
+        BeliefFeed(self, names, scenario, self._diagnostics, self._take_up)
         self._server = GoalServer(
             self,
             PlanGroupPush,
@@ -97,12 +102,17 @@ class OptimizerNode(Node):
     def _take_map(self, grid: Grid) -> None:
         self._grid, self._planner = grid, None
 
+    def _take_up(self, belief: Belief) -> None:
+        """Plan with what is believed of the object and the robots now."""
+        self._item, self._robot = belief.object(self.object), belief.robot(self.robots[0])
+        self._planner = None
+
     def _preempt(self) -> None:
         if self._server.active:
             self._fail(PlanGroupPush.Result.CANCELED, "a new request replaces this one")
 
     def _begin(self, request: Any) -> None:
-        began = time.monotonic()
+        began, cpu = time.monotonic(), time.thread_time()
         result = PlanGroupPush.Result
         try:
             plan = self._plan(request)
@@ -127,6 +137,7 @@ class OptimizerNode(Node):
             way = Trajectory(task.time, task.pose, np.column_stack([speed, task.twist[:, 2]]))
             self._path_publisher.publish(path_to_ros([way], now))
             self._server.finish(PlanGroupPush.Result(plan=message), success=True)
+        self.planning_time += time.thread_time() - cpu
 
     def _plan(self, request: Any) -> GroupPlan:
         if self._grid is None:

@@ -1,1 +1,1 @@
-"""The front door: the command line."""
+"""The command line."""

@@ -1,4 +1,4 @@
-"""Words that several verbs have in common, with their checks."""
+"""Options that several verbs share, with their checks."""
 
 import argparse
 import math
@@ -6,11 +6,11 @@ import signal
 from collections.abc import Callable
 
 from push_bringup.job_result import JobEvent
-from push_bringup.systems import SYSTEMS
+from push_bringup.systems import SYSTEMS, system_names, system_of
 
 
 def add_scenario(parser: argparse.ArgumentParser, default: str | None = "env1-target1") -> None:
-    """``--scenario``; without a default it is heard from the bridge."""
+    """``--scenario``; without a default it is received from the bridge."""
     silent = "" if default else "; what the running bridge publishes when it is not given"
     parser.add_argument(
         "--scenario",
@@ -19,19 +19,15 @@ def add_scenario(parser: argparse.ArgumentParser, default: str | None = "env1-ta
     )
 
 
-SCENARIOS = {
-    "single": "env1-target1",
-    "torque": "wheel-slip",
-    "group": "group-ellipse",
-    "swarm": "swarm-square",
-}
-"""Of each system, where none is named."""
-
-
 def add_system_and_scenario(parser: argparse.ArgumentParser) -> None:
     """The system, of those that are there, and ``--scenario``; ``scenario_of`` tells which."""
-    parser.add_argument("system", choices=list(SYSTEMS), nargs="?", default="single")
-    known = ", ".join(f"{name} for {system}" for system, name in SCENARIOS.items())
+    parser.add_argument(
+        "system",
+        nargs="?",
+        default="single",
+        help=f"one of {', '.join(system_names())}, or MODULE:ATTRIBUTE of a method",
+    )
+    known = ", ".join(f"{system.example} for {name}" for name, system in SYSTEMS.items())
     parser.add_argument(
         "--scenario", default="", help=f"a name in config/scenarios, or a file; {known}"
     )
@@ -39,12 +35,14 @@ def add_system_and_scenario(parser: argparse.ArgumentParser) -> None:
 
 def scenario_of(arguments: argparse.Namespace) -> str:
     """Name or path of the scenario that was asked for."""
-    return str(arguments.scenario or SCENARIOS[arguments.system])
+    return str(arguments.scenario or system_of(arguments.system).example)
 
 
 def add_namespace(parser: argparse.ArgumentParser) -> None:
     """``--namespace``."""
-    parser.add_argument("--namespace", default="", help="of the whole suite, e.g. a or lab/a")
+    parser.add_argument(
+        "--namespace", default="", help="namespace of the whole suite, e.g. a or lab/a"
+    )
 
 
 def add_factor(parser: argparse.ArgumentParser) -> None:
@@ -53,13 +51,13 @@ def add_factor(parser: argparse.ArgumentParser) -> None:
         "--factor",
         type=positive,
         default=None,
-        help="sim time over wall time, instead of the scenario's",
+        help="pace of the simulation, simulated over wall time; default: the scenario's",
     )
 
 
 def add_timeout(parser: argparse.ArgumentParser, default: float) -> None:
     """``--timeout``."""
-    parser.add_argument("--timeout", type=positive, default=default, help="[s] wall time")
+    parser.add_argument("--timeout", type=positive, default=default, help="[s] wall time to wait")
 
 
 def positive(text: str) -> float:
@@ -96,14 +94,14 @@ def whole(least: int) -> Callable[[str], int]:
     return parse
 
 
-_asked: list[int] = []  # signals that came before anybody was there to be stopped
+_asked: list[int] = []  # signals that arrived before anything could be stopped
 
 
 def hear_signals() -> None:
-    """From the first moment on SIGINT and SIGTERM interrupt what is being done, and are remembered.
+    """Let SIGINT and SIGTERM interrupt the program from the first moment on, and remember them.
 
-    Where an interrupt ends up in a finaliser or a callback Python drops it, and a start-up that
-    went on would never be told again.
+    Python drops an interrupt that falls into a finaliser or a callback. A start-up that went on
+    after that would never be interrupted.
     """
 
     def handler(number: int, frame: object) -> None:
@@ -115,8 +113,7 @@ def hear_signals() -> None:
 
 
 def stop_on_signals(request_stop: Callable[[], None]) -> None:
-    """SIGINT and SIGTERM call a function, as long as nobody says otherwise; at once when one has
-    come already."""
+    """Let SIGINT and SIGTERM call a function; it is called at once if one has arrived already."""
 
     def handler(number: int, frame: object) -> None:
         request_stop()
@@ -128,9 +125,11 @@ def stop_on_signals(request_stop: Callable[[], None]) -> None:
 
 
 def tell(event: JobEvent) -> None:
-    """Print what becomes of a job."""
+    """Print the progress of a job."""
     team = f"{event.team}: " if event.team else ""
     if event.kind == "state":
         print(f"  {team}{event.state:12s} {event.reason}", flush=True)
+    elif event.kind in ("silent", "returned"):
+        print(f"  {team}{event.reason}", flush=True)
     elif event.distance is not None:
         print(f"  {team}{event.distance:6.3f} m to go", flush=True)

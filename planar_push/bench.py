@@ -1,4 +1,4 @@
-"""Measure speed and physics, rivals beside."""
+"""Measure speed against other solvers, and physics against theory."""
 
 import argparse
 from pathlib import Path
@@ -9,7 +9,7 @@ from benchmarks import NAMES
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this verb."""
     parser.add_argument("what", nargs="?", default="all", choices=["all", *NAMES])
-    parser.add_argument("--out", default="", help="folder for the JSON")
+    parser.add_argument("--out", default="", help="folder for the JSON results")
 
 
 def run(arguments: argparse.Namespace) -> int:

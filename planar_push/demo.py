@@ -1,4 +1,4 @@
-"""Start everything, push a box to its goal, record, report."""
+"""Run a system once: start it, send the scenario's goals, record, report."""
 
 import argparse
 import math
@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when every object has come to its goal."""
+    """0 if every object has reached its goal."""
     from push_bringup.preparation import check_domain, prepare
     from push_bringup.suite import Suite, scenario_goals
     from push_scenario.scenario import load_scenario
@@ -66,8 +66,8 @@ def run(arguments: argparse.Namespace) -> int:
         if not result.success:
             print(f"error: {result}", file=sys.stderr)
     if not any((out / "bag").glob("*.mcap")):
-        return 1  # nothing was recorded; why has been said
-    for number in (signal.SIGINT, signal.SIGTERM):  # nothing is left to stop: just end
+        return 1  # nothing was recorded; the reason has been printed
+    for number in (signal.SIGINT, signal.SIGTERM):  # nothing is left to stop
         signal.signal(number, lambda *_: sys.exit(130))
     print("writing the report", flush=True)
     write_report(out / "bag", out)

@@ -1,4 +1,4 @@
-"""Many seeded trials, a summary, plots, a bag; goes on where it was interrupted."""
+"""Run seeded trials of a study; write summary, plots and a bag. Continues an interrupted study."""
 
 import argparse
 import time
@@ -9,17 +9,29 @@ from planar_push.arguments import whole
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this verb."""
-    parser.add_argument("name", help="e.g. single-robot")
-    parser.add_argument("--scenarios", default="", help="comma-separated; the experiment's own")
-    parser.add_argument("--trials", type=whole(1), default=5, help="of each scenario")
-    parser.add_argument("--seed", type=whole(0), default=1, help="of the first trial")
+    parser.add_argument("name", help="name of the study, e.g. single-robot")
     parser.add_argument(
-        "--uncertainty", default="mild", help="of the world: none, mild or hard (docs/results.md)"
+        "--scenarios", default="", help="comma-separated scenarios; default: those of the study"
     )
-    parser.add_argument("--world", default="", help="pybullet or planar, where there is a choice")
-    parser.add_argument("--out", default="", help="folder; one that has the beginning is gone on")
+    parser.add_argument(
+        "--trials", type=whole(1), default=5, help="number of trials of each scenario"
+    )
+    parser.add_argument("--seed", type=whole(0), default=1, help="seed of the first trial")
+    parser.add_argument(
+        "--uncertainty",
+        help="what the nodes do not know: none, mild or hard (docs/results.md); refused by studies "
+        "without that choice",
+    )
+    parser.add_argument(
+        "--world", help="pybullet or planar; refused by studies without that choice"
+    )
+    parser.add_argument(
+        "--out", default="", help="output folder; an interrupted study in it is continued"
+    )
     parser.add_argument("--scheduler", default="", help="address of a Dask scheduler")
-    parser.add_argument("--workers", type=whole(0), default=0, help="processes here; 0: one a core")
+    parser.add_argument(
+        "--workers", type=whole(0), default=0, help="local processes; 0: one per core"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -35,8 +47,9 @@ def run(arguments: argparse.Namespace) -> int:
         Path(out),
         arguments.scheduler,
         arguments.workers,
-        arguments.uncertainty,
-        arguments.world,
+        arguments.uncertainty or "mild",
+        arguments.world or "",
+        frozenset(o for o in ("uncertainty", "world") if getattr(arguments, o) is not None),
     )
     summary = run_study(arguments.name, options)
     print(f"\n{out}/summary.json")

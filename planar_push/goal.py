@@ -12,17 +12,17 @@ _PATIENCE = 10.0  # [s] wall time for the suite to be found
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this verb."""
-    parser.add_argument("x", type=finite, help="[m]")
-    parser.add_argument("y", type=finite, help="[m]")
-    parser.add_argument("theta", type=finite, help="[rad]")
-    parser.add_argument("--team", default="", help="whose goal it is, where there are teams")
+    parser.add_argument("x", type=finite, help="[m] in the map frame")
+    parser.add_argument("y", type=finite, help="[m] in the map frame")
+    parser.add_argument("theta", type=finite, help="[rad] heading")
+    parser.add_argument("--team", default="", help="name of the team, if there are several")
     parser.add_argument("--no-wait", action="store_true")
     add_timeout(parser, 300.0)
     add_namespace(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when the job ends well, or waits to be executed."""
+    """0 when the job ends well, or waits to be executed; else 1, with the reason and its code."""
     from push_bringup.monitor import Monitor
 
     check_namespace(arguments.namespace)
@@ -37,8 +37,9 @@ def run(arguments: argparse.Namespace) -> int:
         monitor.send_goal((arguments.x, arguments.y, arguments.theta))
         if arguments.no_wait:
             return 0
-        result = monitor.follow(arguments.timeout, lambda: monitor.supervised)
+        result = monitor.follow(arguments.timeout)
     if result.code is JobError.NONE:
         return 0
-    print(f"error: {result.reason}", file=sys.stderr)
+    code = "" if result.code is None else f" ({result.code.name})"
+    print(f"error: {result.reason}{code}", file=sys.stderr)
     return 1

@@ -1,4 +1,4 @@
-"""Start a system, one process a node, until Ctrl-C."""
+"""Start a system, one process per node, until Ctrl-C."""
 
 import argparse
 import tempfile
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this verb."""
     add_system_and_scenario(parser)
-    parser.add_argument("--record", default="", help="bag folder")
-    parser.add_argument("--respawn", action="store_true", help="start a node that died again")
+    parser.add_argument("--record", default="", help="folder of the bag to record")
+    parser.add_argument("--respawn", action="store_true", help="restart nodes that die")
     add_factor(parser)
     add_namespace(parser)
 
@@ -49,9 +49,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _what_next(setup: "SuiteSetup") -> str:
     """How to make it do something."""
-    from push_bringup.systems import OWNERS, teams_of
+    from push_bringup.systems import teams_of
 
-    if not any(node.kind in OWNERS for node in setup.nodes):
+    if not any(node.traits.owner for node in setup.nodes):
         spaces = [n.namespace for n in setup.nodes if n.kind == "torque_controller"]
         return "send trajectories to: " + ", ".join(f"{s}/follow_trajectory" for s in spaces)
     words = f" --namespace {setup.namespace}" if setup.namespace else ""

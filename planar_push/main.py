@@ -1,5 +1,5 @@
-"""The command line: ``planar-push``. Each verb is a file of this package, with its options and what
-it does; this one is the grammar."""
+"""The command line ``planar-push``. Each command is a file of this package with its options and its
+action; this file is the grammar."""
 
 import argparse
 import importlib
@@ -18,7 +18,7 @@ NOT_VERBS = ("main", "arguments", "__main__")
 
 
 def verbs() -> list[str]:
-    """Names of the modules that are verbs: each has ``add_arguments`` and ``run``."""
+    """Names of the modules that are commands: each has ``add_arguments`` and ``run``."""
     found = (m.name for m in pkgutil.iter_modules([str(Path(__file__).parent)]))
     return sorted(name for name in found if name not in NOT_VERBS)
 
@@ -26,7 +26,7 @@ def verbs() -> list[str]:
 def parser() -> argparse.ArgumentParser:
     """The command line's grammar."""
     top = argparse.ArgumentParser(
-        prog="planar-push", description="Make mobile robots move things by pushing them."
+        prog="planar-push", description="Make mobile robots move objects by pushing them."
     )
     commands = top.add_subparsers(required=True, metavar="COMMAND")
     for name in verbs():
@@ -54,8 +54,8 @@ def main(words: Sequence[str] | None = None) -> int:
 
 
 def command() -> None:
-    """Entry point of the process. It leaves at once: to take down all that was imported costs a
-    second, several on a busy machine, in which a signal would seem not to be heard."""
+    """Entry point of the process. It exits immediately. Tearing down all modules would take
+    a second or more, in which a signal would seem to be ignored."""
     hear_signals()
     try:
         code = main()

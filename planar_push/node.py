@@ -6,7 +6,7 @@ import json
 import sys
 
 from planar_push.arguments import add_scenario
-from push_bringup.systems import MODULES
+from push_bringup.node_kinds import MODULES
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

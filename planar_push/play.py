@@ -1,4 +1,4 @@
-"""Play a bag back for the viewer: poses, map, plans, states; nothing is commanded."""
+"""Play a bag back for the viewer: poses, map, plans and states, but no commands."""
 
 import argparse
 import signal
@@ -12,7 +12,9 @@ from push_bringup.systems import check_namespace
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this verb."""
     parser.add_argument("bag")
-    parser.add_argument("--factor", type=positive, default=1.0, help="bag time over wall time")
+    parser.add_argument(
+        "--factor", type=positive, default=1.0, help="pace of the playback, bag time over wall time"
+    )
     add_namespace(parser)
 
 

@@ -1,4 +1,4 @@
-"""Copy what can be read of a cut-off bag."""
+"""Copy the readable part of a truncated bag."""
 
 import argparse
 from pathlib import Path
@@ -11,7 +11,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when anything could be read."""
+    """0 if anything could be read."""
     from push_record.bag import recover
 
     count = recover(Path(arguments.bag), Path(arguments.out))

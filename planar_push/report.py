@@ -1,4 +1,4 @@
-"""Pictures and a page from a bag."""
+"""Write a report with pictures from a bag."""
 
 import argparse
 import sys

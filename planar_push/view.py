@@ -1,4 +1,4 @@
-"""A live view in the browser; goals by mouse."""
+"""Show a live view in the browser, where goals can be set by mouse."""
 
 import argparse
 import sys
@@ -12,11 +12,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_scenario(parser, None)
     add_namespace(parser)
     parser.add_argument("--host", default="127.0.0.1", help="address to serve on")
-    parser.add_argument("--port", type=whole(0), default=8080, help="0: any that is free")
+    parser.add_argument("--port", type=whole(0), default=8080, help="port; 0 chooses a free one")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Serve until a signal. Which bodies there are is heard from the bridge."""
+    """Serve until a signal. The bodies are received from the bridge."""
     from push_ros.process import run_node
     from push_scenario.scenario import load_scenario
     from push_view.page_server import PageServer

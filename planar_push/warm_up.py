@@ -1,4 +1,4 @@
-"""Compile the numerical kernels, so that no run waits for it."""
+"""Compile the numerical kernels, so that no later run waits for it."""
 
 import argparse
 

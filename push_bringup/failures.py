@@ -1,8 +1,8 @@
-"""Why a suite does not run."""
+"""Reasons why a suite does not run."""
 
 
 class DomainInUse(Exception):
-    """Another bridge runs where this one was to."""
+    """Another bridge already runs in the same domain and namespace."""
 
 
 class SuiteFailed(Exception):

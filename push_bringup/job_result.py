@@ -15,7 +15,8 @@ from push_model.jobs import JobError
 class JobEvent:
     """Something to tell of a job.
 
-    kind: "state" for a step of the job, "progress" for the distance every now and then.
+    kind: "state" for a step of the job, "progress" for the distance every now and then, "silent"
+    when the node that owns the job is missed, "returned" when it is there again.
     stamp: [s] of the newest poses. distance: [m] of the object to its goal, None when not known.
     """
 

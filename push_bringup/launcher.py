@@ -1,4 +1,4 @@
-"""One process per node: start them, watch them, say which one died, stop them all."""
+"""One process per node: start, monitor and stop them, and report which one died."""
 
 import os
 import signal
@@ -12,9 +12,9 @@ from pathlib import Path
 from push_ros.process import die_with_parent, prepare_environment
 
 _GRACE = 2.5  # [s] after SIGINT, then SIGTERM
-_MOST_DEATHS = 5  # of one node, until it is not started again
+_MOST_DEATHS = 5  # restarts of one node before it is given up
 _LAST = 0.8  # [s] after SIGTERM, then SIGKILL
-_TAIL = 600  # [characters] of what a dead node said
+_TAIL = 600  # [characters] kept of a dead node's output
 
 
 @dataclass
@@ -33,7 +33,7 @@ class Child:
 
     @property
     def words(self) -> list[str]:
-        """Its command line; a recorder that was started again writes beside what is there."""
+        """Its command line; a restarted recorder writes to a new folder beside the old one."""
         words = list(self.arguments)
         if self.bag is not None and self.deaths:
             words += ["-p", f'out:="{self.bag}-{self.deaths + 1}"']
@@ -44,7 +44,7 @@ class Launcher:
     """Runs children until it is told to stop or one of them dies.
 
     respawn: start a dead child again instead of stopping.
-    logs: folder for what the children say; on the terminal when it is not given.
+    logs: folder for the output of the children; the terminal if not given.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class Launcher:
         logs: Path | None = None,
         domain: int | None = None,
     ) -> None:
-        """domain: ROS domain of the children; that of the environment when it is not given."""
+        """domain: ROS domain of the children; that of the environment if not given."""
         self.children = list(children)
         self._respawn = respawn
         self._say = say
@@ -95,14 +95,14 @@ class Launcher:
         return self._logs / f"{child.name.replace('/', '-')}.log"
 
     def last_words(self, name: str) -> str:
-        """The end of what a child said, where that is kept."""
+        """The last output of a child, if it is kept."""
         (child,) = (c for c in self.children if c.name == name)
         if self._logs is None or not self._log(child).is_file():
             return ""
         return self._log(child).read_text(errors="replace").strip()[-_TAIL:]
 
     def request_stop(self) -> None:
-        """May be called from a signal handler."""
+        """Ask the launcher to stop; may be called from a signal handler."""
         self._stopping = True
 
     @property
@@ -111,7 +111,7 @@ class Launcher:
         return self._stopping
 
     def check(self) -> list[str]:
-        """Names of children that died since the last check; respawns them if so asked."""
+        """Names of children that died since the last check; restarts them if respawn is set."""
         dead = []
         for child in self.children:
             code = None if child.process is None else child.process.poll()
@@ -133,12 +133,12 @@ class Launcher:
         return dead
 
     def failed(self) -> list[str]:
-        """Names of children that died since the last check and will not come back."""
+        """Names of children that died since the last check and are not restarted."""
         dead = self.check()
         return dead if self._gave_up or not self._respawn else []
 
     def run(self, finished: Callable[[], bool] = lambda: False) -> int:
-        """Watch until stopped; 0 when asked to stop or finished, 1 when a child died."""
+        """Monitor until stopped; 0 if asked to stop or finished, 1 if a child died."""
         code = 0
         while not self._stopping and not finished():
             if self.failed():

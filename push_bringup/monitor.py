@@ -11,6 +11,7 @@ from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import OccupancyGrid
 
 from push_bringup.job_result import JobEvent, JobResult, errors_of, result_of
+from push_bringup.owner_watch import SILENCE, Owner, OwnerWatch
 from push_bringup.systems import team_space
 from push_model.arrays import Array
 from push_model.jobs import JobError
@@ -23,6 +24,7 @@ from push_ros.qos import COMMAND, LATCHED, STREAM
 
 Pose = tuple[float, float, float]
 _PROGRESS = 2.0  # [s] wall time between events that tell the distance
+_LOOK = 0.2  # [s] wall time between two looks at the graph
 _SAME = 1e-6  # [m], [rad] goals that are the same
 
 
@@ -53,7 +55,10 @@ class Monitor:
         self._sent: PoseStamped | None = None
         self._news: list[JobState] = []
         self._began = False
-        self._begin = self._told = 0.0
+        self._job = 0  # number of the job that pursues the goal sent; of the one before, until then
+        self._begin = self._told = self._looked = 0.0
+        self._owner = OwnerWatch(frozenset())
+        self._missed = False
 
     def __enter__(self) -> "Monitor":
         node, self._spinner = self._stack.enter_context(visitor(self._context))
@@ -133,6 +138,8 @@ class Monitor:
         """Publish a goal (x, y, theta) [m, m, rad]."""
         self._goal = (float(goal[0]), float(goal[1]), float(goal[2]))
         self._news, self._began = [], False
+        self._job = 0 if self.state is None else int(self.state.job)
+        self._owner = OwnerWatch(self._owners())
         self._begin, self._told = self.stamp, time.monotonic()
         # its stamp tells it from the goals of others
         self._sent = pose_stamped_to_ros(np.array(self._goal), time.time())
@@ -163,16 +170,58 @@ class Monitor:
                 code, reason = JobError(int(state.refusal_code)), f"goal refused: {state.refusal}"
                 return replace(refused, code=code, reason=reason, refused=True)
             if self._pursues_mine(state):
-                self._began = True
+                self._began, self._job = True, int(state.job)
                 self._tell("state")
                 if state.state == JobState.IDLE:
                     duration = self.stamp - self._begin
                     return result_of(state, self._goal, self.pose, duration, self.team)
+            elif state.job < self._job or (self._began and state.job == self._job):
+                return self._forgotten()  # each goal that is taken has a higher number
             elif self._began:
                 return self.unfinished("another goal has replaced this one", JobError.PREEMPTED)
-        if time.monotonic() - self._told > _PROGRESS:
+        if time.monotonic() - self._looked > _LOOK:
+            self._looked = time.monotonic()
+            result = self._look_for_owner()
+            if result is not None:
+                return result
+        if time.monotonic() - self._told > _PROGRESS and self.state is not None:
             self._tell("progress")
         return None
+
+    def _owners(self) -> frozenset[bytes]:
+        """Publishers of the state of the job."""
+        found = self._node.get_publishers_info_by_topic(self._names.team("job_state"))
+        return frozenset(bytes(info.endpoint_gid) for info in found)
+
+    def _look_for_owner(self) -> JobResult | None:
+        """The result where the owner of the job is gone for good; tells when it is missed."""
+        world = int(self._node.count_publishers(self._names.world("poses"))) > 0
+        before, self._missed = self._missed, False
+        owner = self._owner.look(time.monotonic(), self._owners(), world)
+        if owner is Owner.REPLACED:
+            return self._forgotten()
+        if owner is Owner.ENDED:
+            return self.unfinished("the nodes have ended before the job")
+        if owner is Owner.SILENT:
+            return self.unfinished(
+                f"the node that owns the job has not been heard of for {SILENCE:g} s; if it is "
+                "only frozen, the job goes on when it wakes",
+                JobError.OWNER_SILENT,
+            )
+        if owner is Owner.MISSING:
+            self._missed = True
+            if not before:
+                text = "the node that owns the job is not heard of; it may be frozen, or have died"
+                self._tell("silent", text)
+        elif owner is Owner.RETURNED:
+            self._tell("returned", "the node that owns the job is heard of again")
+        return None
+
+    def _forgotten(self) -> JobResult:
+        return self.unfinished(
+            "the node that owned the job was restarted and has forgotten it; send the goal again",
+            JobError.JOB_FORGOTTEN,
+        )
 
     def unfinished(self, reason: str, code: JobError | None = None) -> JobResult:
         """The result of a goal whose end nobody saw."""
@@ -181,18 +230,19 @@ class Monitor:
         duration = self.stamp - self._begin
         return JobResult(code, reason, self._goal, position, orientation, duration, team=self.team)
 
-    def _tell(self, kind: str) -> None:
+    def _tell(self, kind: str, why: str = "") -> None:
         assert self._goal is not None and (self.state is not None)
         self._told = time.monotonic()
         gap = None if self.pose is None else errors_of(self._goal, self.pose)[0]
         state = self.state
-        name, reason = str(state.state_name).lower(), str(state.reason)
+        name, reason = str(state.state_name).lower(), why or str(state.reason)
         self._on_event(JobEvent(kind, self.team, self.stamp, name, reason, gap))
 
     def follow(self, limit: float, alive: Callable[[], bool] = lambda: True) -> JobResult:
         """Wait until the job ends, or its plan waits for the execute command.
 
-        Its code is None after limit [s] of wall time, or when no longer alive.
+        Its code is None after limit [s] of wall time, when no longer alive, and when all nodes have
+        ended. Where the owner of the job is frozen or was restarted, a code of its own says so.
         """
         end = time.monotonic() + limit
         while time.monotonic() < end:

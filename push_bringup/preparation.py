@@ -1,4 +1,4 @@
-"""What a suite needs before it starts: everything is checked here, nothing is started."""
+"""Checks before a suite starts. Nothing is started here."""
 
 import os
 from collections.abc import Mapping
@@ -9,19 +9,19 @@ from typing import Any
 from push_bringup.failures import DomainInUse
 from push_bringup.launcher import Child
 from push_bringup.node_settings import changed, resolved
-from push_bringup.systems import LIVE, MODULES, NodeSpec, nodes_of, recorder
+from push_bringup.systems import LIVE, NodeSpec, nodes_of, recorder
 from push_model.settings import SettingsError
 from push_ros.claims import world_is_claimed
 from push_ros.latched import has_publisher
 from push_ros.names import space
 from push_scenario.scenario import Scenario, load_scenario
 
-_DISCOVERY = 1.0  # [s] wall time that a bridge has to be discovered
+_DISCOVERY = 1.0  # [s] wall time to discover another bridge
 
 
 @dataclass(frozen=True)
 class SuiteSetup:
-    """A suite that could start: its scenario, resolved, and its nodes. namespace: of the world."""
+    """A suite that can start: its resolved scenario and its nodes. namespace: of the world."""
 
     scenario: Scenario
     nodes: tuple[NodeSpec, ...]
@@ -29,13 +29,13 @@ class SuiteSetup:
     bag: Path | None
 
     def write(self, folder: Path) -> list[Child]:
-        """Write the resolved scenario into a folder; the processes that read it there."""
+        """Write the resolved scenario into a folder; return the processes that read it there."""
         file = folder / f"{self.scenario.name}.yaml"
         file.write_text(self.scenario.text, encoding="utf-8")
         children = []
         for node in self.nodes:
             bag = self.bag if node.kind == "recorder" else None
-            children.append(Child(node.name, MODULES[node.kind], node.words(str(file)), bag))
+            children.append(Child(node.name, node.traits.module, node.words(str(file)), bag))
         return children
 
 
@@ -48,14 +48,14 @@ def prepare(
     record: str | Path = "",
     factor: float | None = None,
 ) -> SuiteSetup:
-    """Check all that can be wrong and say so in one place.
+    """Check everything that can be wrong with the arguments, and report it in one place.
 
     Parameters
     ----------
-    scenario: name, path, or one that is made already.
+    scenario: name, path, or a Scenario.
     parameters: node name to settings that replace the scenario's, nested as in its file.
-    record: bag folder, which must not be there yet. factor: sim time over wall time; the
-        scenario's, or 1, when it is not given.
+    record: folder of the bag, which must not exist. factor: simulated over wall time;
+        default: the scenario's, or 1.
 
     Raises
     ------
@@ -79,14 +79,14 @@ def prepare(
 def check_bag(folder: Path) -> None:
     """Raise unless a bag can be written there: FileExistsError, or SettingsError."""
     if folder.exists():
-        raise FileExistsError(f"{folder} is there already; choose another folder for the bag")
+        raise FileExistsError(f"{folder} exists already; choose another folder for the bag")
     above = next(p for p in folder.absolute().parents if p.exists())
     if not above.is_dir() or not os.access(above, os.W_OK | os.X_OK):
         raise SettingsError(f"{folder}: a bag cannot be written below {above}")
 
 
 def check_domain(namespace: str = "", context: Any = None) -> None:
-    """Raise DomainInUse when a bridge, or another source of poses, is there already."""
+    """Raise DomainInUse if a bridge, or another source of poses, exists already."""
     domain = os.environ.get("ROS_DOMAIN_ID") or "0"
     if context is not None:
         domain = str(context.get_domain_id())

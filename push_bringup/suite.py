@@ -1,4 +1,4 @@
-"""A whole suite from a Python script: its nodes as processes, goals in, results out.
+"""Run a suite from a Python script: its nodes as processes, goals in, results out.
 
 ::
 
@@ -19,18 +19,18 @@ from push_bringup.job_result import JobEvent, JobResult
 from push_bringup.launcher import Launcher
 from push_bringup.monitor import Monitor, Pose
 from push_bringup.preparation import check_domain, prepare
-from push_bringup.systems import MODULES, OWNERS, teams_of
+from push_bringup.systems import teams_of
 from push_model.settings import SettingsError
 from push_ros.latched import own_context
 from push_scenario.scenario import Scenario
 
-_START = 60.0  # [s] wall time that all nodes have to come up
+_START = 60.0  # [s] wall time for all nodes to start
 
 
 class Suite:
-    """Runs a system in processes of its own. Use it as a context manager.
+    """Runs a system in its own processes. Use it as a context manager.
 
-    It prints nothing; what the nodes say is kept, and quoted when one of them dies.
+    It prints nothing. The output of the nodes is kept, and quoted if one of them dies.
     """
 
     def __init__(
@@ -47,15 +47,15 @@ class Suite:
         on_event: Callable[[JobEvent], None] | None = None,
         context: Any = None,
     ) -> None:
-        """Check everything; start nothing yet.
+        """Check the arguments; start nothing yet.
 
         Parameters
         ----------
         scenario, system, parameters, namespace, record, factor: see ``prepare``.
         respawn: start a node that died again. verbose: let the nodes write to the terminal.
-        on_event: called with each ``JobEvent`` while a call of this class waits; the supervisors
-            then log warnings only, not the states that it tells.
-        context: of ROS, whose domain the nodes use; one of its own when it is not given.
+        on_event: called with each ``JobEvent`` while a method of this class waits; the supervisors
+            then log only warnings, not their states.
+        context: ROS context whose domain the nodes use; default: a new one.
 
         Raises
         ------
@@ -72,7 +72,8 @@ class Suite:
         self.scenario = self.setup.scenario
         self._respawn, self._verbose = respawn, verbose
         self._on_event = on_event or (lambda event: None)
-        self._quiet = tuple(MODULES[kind] for kind in OWNERS) if on_event else ()
+        owners = [node for node in self.setup.nodes if node.traits.owner]
+        self._quiet = tuple(node.traits.module for node in owners) if on_event else ()
         self._context = context
         self._stack = ExitStack()
         self._launcher: Launcher | None = None
@@ -135,7 +136,7 @@ class Suite:
             raise SuiteFailed("\n".join([*self._said[-len(dead) :], *words]))
 
     def request_stop(self) -> None:
-        """Let whatever waits return soon; may be called from a signal handler."""
+        """Make waiting methods return soon; may be called from a signal handler."""
         self._stopping = self._stop_requested = True
         if self._launcher is not None:
             self._launcher.request_stop()
@@ -146,12 +147,12 @@ class Suite:
         return self._stop_requested
 
     def stop(self) -> None:
-        """End all nodes, which closes the bag; safe to call twice."""
+        """Stop all nodes, which closes the bag; safe to call twice."""
         self._stopping = True
         self._stack.close()
 
     def monitor(self, team: str = "") -> Monitor:
-        """The client that talks to a team; the first team's when no name is given."""
+        """The client of a team; of the first team if no name is given."""
         team = team or next(iter(self._monitors))
         if team not in self._monitors:
             known = ", ".join(self._monitors)
@@ -165,7 +166,7 @@ class Suite:
 
         Raises
         ------
-        SuiteFailed: a node died meanwhile.
+        SuiteFailed: a node died during the job.
         """
         name = self.monitor(team).team
         return self.reach_all({name: (x, y, theta)}, timeout=timeout)[name]
@@ -173,7 +174,7 @@ class Suite:
     def reach_all(
         self, goals: Mapping[str, Pose] | None = None, *, timeout: float = 300.0
     ) -> dict[str, JobResult]:
-        """Goals of several teams at once, each team's from the scenario when they are not given."""
+        """Send goals to several teams at once; default: each team's goal of the scenario."""
         if goals is None:
             goals = scenario_goals(self.scenario)
         waiting = {self.monitor(name).team: goal for name, goal in goals.items()}

@@ -1,53 +1,38 @@
 """The systems: which nodes make one up, for whom, and where they live.
 
 One list serves the launcher (a process a node), lockstep (all nodes in one process) and the tests.
-A further system is a function that returns such a list, and a row in ``SYSTEMS``.
+A further method is a system of its own without an edit here; a system of several kinds of nodes is
+a function that returns such a list, and a row in ``SYSTEMS``.
 """
 
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 from rclpy.node import Node
 
-from push_model.bumpers import RingBumper
-from push_model.drives import HolonomicDrive, SpeedDrive, TorqueDrive
+from grasp_opt.group_method import GROUP
+from push_bringup.node_kinds import NodeKind, kind_of
+from push_job.method import method_names, method_spec
+from push_model.drives import TorqueDrive
 from push_model.settings import SettingsError
 from push_ros.names import inside, space
 from push_scenario.scenario import Scenario
 from push_scenario.teams import Team
+from swarm_push.swarm_method import SWARM
 
 LIVE: dict[str, dict[str, Any]] = {"controller": {"tracker": {"deadline": 0.03}}}
 """Settings of live use, where the scenario is silent. A run in lockstep must not depend on the wall
 clock: there a solve has no deadline [s]."""
 
-LOCKSTEP: dict[str, dict[str, Any]] = {"bridge": {"lockstep_timeout": 60.0}}
-"""Settings of a run in lockstep, where the scenario is silent. All nodes are in one process: who is
-waited for [s] is never dead, it is the machine that is busy."""
+LOCKSTEP: dict[str, dict[str, Any]] = {"bridge": {"lockstep_warning": 60.0}}
+"""Settings of a run in lockstep, where the scenario is silent. All nodes are in one process, so a
+late answer [s] means a busy machine."""
 
 GROUP_MOST = 5
 """Robots of a group at most."""
-
-OWNERS = ("supervisor", "group", "swarm")
-"""Kinds of nodes that own jobs: one a team."""
-
-CROWDS = ("group", "swarm")
-"""Those of them that command all robots of their team themselves."""
-
-MODULES = {
-    "bridge": "sim_bridge.node",
-    "planner": "push_planner.node",
-    "controller": "push_mpc.node",
-    "supervisor": "push_supervisor.node",
-    "torque_controller": "push_mpc.torque_node",
-    "group": "grasp_opt.node",
-    "optimizer": "grasp_opt.optimizer_node",
-    "swarm": "swarm_push.node",
-    "swarm_agent": "swarm_push.agent_node",
-    "recorder": "push_record.recorder",
-}
-"""Kind of a node to the module whose ``main`` runs it in a process of its own."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +40,7 @@ class NodeSpec:
     """A node of a system.
 
     name: what it is called in messages to people; unique in the system.
-    kind: key of ``MODULES``. namespace: where it lives. world: namespace of the bridge.
+    kind: see ``kind_of``. namespace: where it lives. world: namespace of the bridge.
     robot, robots, item, team: whom it serves; empty where it serves all.
     parameters: further ROS parameters. remaps: names to names, besides the namespace.
     """
@@ -71,17 +56,22 @@ class NodeSpec:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     remaps: Mapping[str, str] = field(default_factory=dict)
 
+    @property
+    def traits(self) -> NodeKind:
+        """What its kind is."""
+        return kind_of(self.kind)
+
     def words(self, scenario: str) -> list[str]:
         """Command line of its process; scenario: name or path of the file that it reads."""
+        own = {
+            "world": self.world,
+            "robot": self.robot,
+            "robots": list(self.robots),
+            "object": self.item,
+            "method": self.kind,
+        }
         values: dict[str, Any] = {"scenario": scenario, **self.parameters}
-        if self.kind in (*OWNERS, "planner", "optimizer", "swarm_agent", "recorder"):
-            values["world"] = self.world
-        if self.kind in ("controller", "supervisor", "torque_controller", "swarm_agent"):
-            values["robot"] = self.robot
-        if self.kind in (*CROWDS, "optimizer", "swarm_agent"):
-            values["robots"] = list(self.robots)
-        if self.kind in (*OWNERS, "optimizer", "swarm_agent"):
-            values["object"] = self.item
+        values.update({name: own[name] for name in self.traits.takes})
         remaps = {"__ns": self.namespace, **self.remaps}
         words = ["--ros-args"]
         for name, to in remaps.items():
@@ -92,76 +82,7 @@ class NodeSpec:
 
     def make(self, scenario: Scenario) -> Node:
         """The node in this process, e.g. for a run in lockstep; a bridge waits to be started."""
-        return _MAKERS[self.kind](self, scenario)
-
-
-def _bridge(spec: NodeSpec, scenario: Scenario) -> Node:
-    from sim_bridge.node import BridgeNode
-
-    return BridgeNode(scenario, autostart=False, namespace=spec.namespace)
-
-
-def _planner(spec: NodeSpec, scenario: Scenario) -> Node:
-    from push_planner.node import PlannerNode
-
-    return PlannerNode(scenario, namespace=spec.namespace, world=spec.world)
-
-
-def _controller(spec: NodeSpec, scenario: Scenario) -> Node:
-    from push_mpc.node import ControllerNode
-
-    return ControllerNode(scenario, spec.robot, namespace=spec.world)
-
-
-def _supervisor(spec: NodeSpec, scenario: Scenario) -> Node:
-    from push_supervisor.node import SupervisorNode
-
-    return SupervisorNode(
-        scenario, spec.robot, spec.item, namespace=spec.namespace, world=spec.world
-    )
-
-
-def _torque_controller(spec: NodeSpec, scenario: Scenario) -> Node:
-    from push_mpc.torque_node import TorqueControllerNode
-
-    return TorqueControllerNode(scenario, spec.robot, namespace=spec.world)
-
-
-def _group(spec: NodeSpec, scenario: Scenario) -> Node:
-    from grasp_opt.node import GroupNode
-
-    return GroupNode(scenario, spec.robots, spec.item, spec.namespace, spec.world)
-
-
-def _optimizer(spec: NodeSpec, scenario: Scenario) -> Node:
-    from grasp_opt.optimizer_node import OptimizerNode
-
-    return OptimizerNode(scenario, spec.robots, spec.item, spec.namespace, spec.world)
-
-
-def _swarm(spec: NodeSpec, scenario: Scenario) -> Node:
-    from swarm_push.node import SwarmNode
-
-    return SwarmNode(scenario, spec.robots, spec.item, spec.namespace, spec.world)
-
-
-def _swarm_agent(spec: NodeSpec, scenario: Scenario) -> Node:
-    from swarm_push.agent_node import SwarmAgentNode
-
-    return SwarmAgentNode(scenario, spec.robot, spec.robots, spec.item, spec.namespace, spec.world)
-
-
-_MAKERS: dict[str, Callable[[NodeSpec, Scenario], Node]] = {
-    "bridge": _bridge,
-    "planner": _planner,
-    "controller": _controller,
-    "supervisor": _supervisor,
-    "torque_controller": _torque_controller,
-    "group": _group,
-    "optimizer": _optimizer,
-    "swarm": _swarm,
-    "swarm_agent": _swarm_agent,
-}
+        return self.traits.make(self, scenario)
 
 
 def teams_of(scenario: Scenario) -> tuple[Team, ...]:
@@ -231,105 +152,126 @@ def torque(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
     )
 
 
-def _check_crowd(scenario: Scenario, team: Team, system: str) -> str:
-    """Who the team is, in words. Raise SettingsError unless it has an object, and round robots of
-    one type with wheels of controlled speed, or in a swarm such that go in any direction."""
-    whose = f"scenario '{scenario.name}': " + (f"team '{team.name}'" if team.name else "it")
-    if not team.robots:
-        raise SettingsError(f"{whose} has no robots")
-    if not team.object:
-        raise SettingsError(f"{whose} has no object to push")
-    types = [scenario.robots[name][0] for name in team.robots]
-    if any(t != types[0] for t in types):
-        raise SettingsError(f"{whose} has robots of several types, a {system} is of one type")
-    drives = (SpeedDrive, HolonomicDrive) if system == "swarm" else (SpeedDrive,)
-    if not isinstance(types[0].bumper, RingBumper) or not isinstance(types[0].drive, drives):
-        driven = "a controlled speed" if system == "swarm" else "wheels of controlled speed"
-        raise SettingsError(
-            f"{whose} has robots without a ring bumper and {driven}, which a {system} needs"
-        )
-    return whose
-
-
-def group(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
-    """Two to five robots that push one object, for each team; all in one world.
+def method(name: str, scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
+    """One node that hosts a method, for each team; all in one world.
 
     Raises
     ------
-    SettingsError: a team has fewer than two robots, or more; robots of several types, or without a
-        round bumper; no object, or one whose outline is not convex.
+    SettingsError: there is no such method, or a team is not one that it can drive.
     """
     world = _absolute(namespace)
     nodes = [NodeSpec("bridge", "bridge", world, world)]
+    spec = {"group": GROUP, "swarm": SWARM}.get(name) or method_spec(name)
+    if spec is None:
+        raise SettingsError(f"no method called '{name}'")
     for team in teams_of(scenario):
-        whose = _check_crowd(scenario, team, "group")
-        count = len(team.robots)
-        if not 2 <= count <= GROUP_MOST:
-            raise SettingsError(
-                f"{whose} has {count} robots, the system 'group' takes 2 to {GROUP_MOST} a team"
-            )
-        if not scenario.objects[team.object][0].geometry.convex:
-            raise SettingsError(
-                f"{whose} pushes '{team.object}', whose outline is not convex: groups push "
-                "convex objects"
-            )
-        place = team_space(namespace, team.name)
-        prefix = f"{team.name}/" if team.name else ""
-        nodes += [
+        whose = f"scenario '{scenario.name}': " + (f"team '{team.name}'" if team.name else "it")
+        if not team.robots:
+            raise SettingsError(f"{whose} has no robots")
+        if not team.object:
+            raise SettingsError(f"{whose} has no object to push")
+        try:
+            robots = {r: scenario.robots[r][0] for r in team.robots}
+            spec.check(robots, scenario.objects[team.object][0])
+        except SettingsError as error:
+            raise SettingsError(f"{whose} {error}") from None
+        place, prefix = team_space(namespace, team.name), f"{team.name}/" if team.name else ""
+        nodes.append(
             NodeSpec(
-                f"{prefix}{kind}",
-                kind,
+                f"{prefix}{spec.name}",
+                name,
                 place,
                 world,
                 robots=team.robots,
                 item=team.object,
                 team=team.name,
             )
-            for kind in ("optimizer", "group")
-        ]
+        )
+    return tuple(nodes)
+
+
+def group(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
+    """Two to five robots that push one object, for each team, and a grasp optimizer.
+
+    Raises
+    ------
+    SettingsError: see ``method``.
+    """
+    nodes: list[NodeSpec] = []
+    for node in method("group", scenario, namespace):
+        if node.kind == "group":
+            name = f"{node.team}/optimizer" if node.team else "optimizer"
+            nodes.append(replace(node, name=name, kind="optimizer"))
+        nodes.append(node)
     return tuple(nodes)
 
 
 def swarm(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
-    """Any number of robots that move one object, for each team; all in one world. One node moves
-    them all, or each robot has its own where ``agents.decentralised`` of ``swarm`` says so.
+    """Any number of robots that move one object, for each team. One node moves them all, or each
+    robot has its own where ``agents.decentralised`` of ``swarm`` says so.
 
     Raises
     ------
-    SettingsError: a team has no robot or no object, robots of several types, or without a round
-        bumper and a controlled speed.
+    SettingsError: see ``method``.
     """
-    world = _absolute(namespace)
-    nodes = [NodeSpec("bridge", "bridge", world, world)]
     alone = scenario.parameters.get("swarm", {}).get("agents", {}).get("decentralised", False)
-    for team in teams_of(scenario):
-        _check_crowd(scenario, team, "swarm")
-        prefix = f"{team.name}/" if team.name else ""
-        desk = NodeSpec(
-            f"{prefix}swarm",
-            "swarm",
-            team_space(namespace, team.name),
-            world,
-            robots=team.robots,
-            item=team.object,
-            team=team.name,
-        )
-        nodes.append(desk)
+    nodes: list[NodeSpec] = []
+    for node in method("swarm", scenario, namespace):
+        nodes.append(node)
+        if node.kind != "swarm" or not alone:
+            continue
+        prefix = f"{node.team}/" if node.team else ""
         nodes += [
-            replace(desk, name=f"{prefix}{robot}/agent", kind="swarm_agent", robot=robot,
-                    remaps={"__node": f"agent_{robot}"})
-            for robot in (team.robots if alone else ())
-        ]  # fmt: skip
+            replace(
+                node,
+                name=f"{prefix}{robot}/agent",
+                kind="swarm_agent",
+                robot=robot,
+                remaps={"__node": f"agent_{robot}"},
+            )
+            for robot in node.robots
+        ]
     return tuple(nodes)
 
 
-SYSTEMS: dict[str, Callable[[Scenario, str], tuple[NodeSpec, ...]]] = {
-    "single": single,
-    "torque": torque,
-    "group": group,
-    "swarm": swarm,
+@dataclass(frozen=True)
+class System:
+    """nodes: lists its nodes for a scenario in a namespace. example: scenario to start it with."""
+
+    nodes: Callable[[Scenario, str], tuple[NodeSpec, ...]]
+    example: str
+
+
+SYSTEMS: dict[str, System] = {
+    "single": System(single, "env1-target1"),
+    "torque": System(torque, "wheel-slip"),
+    "group": System(group, GROUP.example),
+    "swarm": System(swarm, SWARM.example),
 }
-"""Name of a system to the function that lists its nodes for a scenario in a namespace."""
+"""Systems of more than one kind of node, by name. Any method is a system too, of its one node."""
+
+
+def system_of(name: str) -> System:
+    """A system by its name, or that of a method by its name or ``module:ATTRIBUTE``.
+
+    Raises
+    ------
+    SettingsError: there is no such system.
+    """
+    if name in SYSTEMS:
+        return SYSTEMS[name]
+    spec = method_spec(name)
+    if spec is None:
+        known = ", ".join(system_names())
+        raise SettingsError(
+            f"no system called '{name}'; expected one of: {known}, or MODULE:ATTRIBUTE of a method"
+        )
+    return System(partial(method, name), spec.example)
+
+
+def system_names() -> tuple[str, ...]:
+    """Names of all systems, those of installed methods among them."""
+    return tuple(dict.fromkeys((*SYSTEMS, *method_names())))
 
 
 def nodes_of(system: str, scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
@@ -339,11 +281,9 @@ def nodes_of(system: str, scenario: Scenario, namespace: str = "") -> tuple[Node
     ------
     SettingsError: there is no such system, the scenario does not suit it, or the namespace is none.
     """
-    if system not in SYSTEMS:
-        known = ", ".join(SYSTEMS)
-        raise SettingsError(f"no system called '{system}'; expected one of: {known}")
+    found = system_of(system)
     check_namespace(namespace)
-    return SYSTEMS[system](scenario, namespace)
+    return found.nodes(scenario, namespace)
 
 
 def check_namespace(namespace: str) -> None:

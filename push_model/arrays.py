@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-"""Quantities."""
+"""Real numbers."""
 Mask = NDArray[np.bool_]
-"""Which of them."""
+"""Selections of elements."""
 Rows = NDArray[np.intp]
-"""Indices into them."""
+"""Indices of elements."""

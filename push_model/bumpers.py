@@ -1,4 +1,4 @@
-"""What a robot pushes with: the ``bumper`` of a robot type, told by ``kind``."""
+"""The ``bumper`` of a robot type, chosen by ``kind``: what the robot pushes with."""
 
 import math
 from dataclasses import field
@@ -18,12 +18,15 @@ class FlatBumper:
     """A flat face across the front, a line contact (sections 2.4.7 and 2.6)."""
 
     kind: Literal["flat"] = field(default="flat", kw_only=True)
-    width: float = bounded(low=1e-3, high=2.0, doc="[m] of the flat face")
-    distance: float = bounded(low=1e-3, high=2.0, doc="[m] D, axle to face")
+    width: float = bounded(low=1e-3, high=2.0, doc="Width of the flat face (m)")
+    distance: float = bounded(low=1e-3, high=2.0, doc="Distance D from the axle to the face (m)")
     z: float | None = bounded(
-        None, low=1e-3, high=2.0, doc="[m] of its middle above the floor; by default the axle's"
+        None,
+        low=1e-3,
+        high=2.0,
+        doc="Height of its middle above the floor (m); default: the axle's",
     )
-    height: float = bounded(0.006, low=1e-3, high=1.0, doc="[m] of the face")
+    height: float = bounded(0.006, low=1e-3, high=1.0, doc="Height of the face (m)")
 
     @property
     def reach(self) -> float:
@@ -47,11 +50,14 @@ class RingBumper:
     """A ring about the axle midpoint, a point contact in any direction (chapters 3 and 4)."""
 
     kind: Literal["ring"] = field(default="ring", kw_only=True)
-    radius: float = bounded(low=1e-3, high=2.0, doc="[m]")
+    radius: float = bounded(low=1e-3, high=2.0, doc="Radius of the ring (m)")
     z: float | None = bounded(
-        None, low=1e-3, high=2.0, doc="[m] of its middle above the floor; by default the axle's"
+        None,
+        low=1e-3,
+        high=2.0,
+        doc="Height of its middle above the floor (m); default: the axle's",
     )
-    height: float = bounded(0.006, low=1e-3, high=1.0, doc="[m]")
+    height: float = bounded(0.006, low=1e-3, high=1.0, doc="Height of the ring (m)")
 
     @property
     def distance(self) -> float:

@@ -1,10 +1,10 @@
-"""Cutting an outline into convex parts, for what can only handle those, e.g. collision shapes."""
+"""Convex decomposition of an outline, e.g. for collision shapes."""
 
 import numpy as np
 
 from push_model.arrays import Array
 
-_STRAIGHT = 1e-12  # of the outline's size squared: a turn that counts as none
+_STRAIGHT = 1e-12  # of the outline's size squared: a smaller turn counts as straight
 
 
 def convex_parts(outline: Array) -> list[Array]:
@@ -17,8 +17,8 @@ def convex_parts(outline: Array) -> list[Array]:
     Returns
     -------
     ``(m, 2)`` [m] each, counter-clockwise, corners of the outline only. A convex outline is its
-    only part. Ears are cut off, then neighbours joined as long as they stay convex (Hertel and
-    Mehlhorn 1983), which gives at most four times as many parts as there must be.
+    only part. The outline is triangulated by ear clipping; neighbours are then merged while they
+    stay convex (Hertel and Mehlhorn 1983). The result has at most four times the least number.
     """
     points = np.asarray(outline, dtype=np.float64)
     flat = _STRAIGHT * float(np.ptp(points, axis=0).max()) ** 2
@@ -38,7 +38,7 @@ def convex_parts(outline: Array) -> list[Array]:
 
 
 def _triangles(points: Array, flat: float) -> list[list[int]]:
-    """Corners of triangles that cover the outline; ears cut off one after another."""
+    """Corners of triangles that cover the outline, by ear clipping."""
     left = list(range(len(points)))
     triangles = []
     while len(left) > 3:
@@ -48,7 +48,7 @@ def _triangles(points: Array, flat: float) -> list[list[int]]:
             turn = _turn(points[a], points[b], points[c])
             if turn <= flat:
                 if abs(turn) <= flat and quality == -np.inf:
-                    best, quality = k, -1.0  # a corner on a line may go where there is no ear
+                    best, quality = k, -1.0  # without an ear, remove a corner on a straight line
                 continue
             rest = points[[i for i in left if i not in (a, b, c)]]
             if not _holds_any(points[a], points[b], points[c], rest):
@@ -56,7 +56,7 @@ def _triangles(points: Array, flat: float) -> list[list[int]]:
                     float(np.hypot(*(points[p] - points[q]))) for p, q in ((a, b), (b, c), (c, a))
                 )
                 if turn / longest**2 > quality:
-                    best, quality = k, turn / longest**2  # the least pointed ear
+                    best, quality = k, turn / longest**2  # the least acute ear
         a, b, c = left[best - 1], left[best], left[(best + 1) % len(left)]
         if quality > 0.0:
             triangles.append([a, b, c])

@@ -1,4 +1,4 @@
-"""What moves a robot and how fast: the ``drive`` of a robot type, told by ``kind``."""
+"""The ``drive`` of a robot type, chosen by ``kind``: what moves the robot, and how fast."""
 
 import math
 from dataclasses import field
@@ -13,15 +13,20 @@ class SpeedDrive(DifferentialDrive):
     """Two wheels whose speed is controlled, as on an e-puck."""
 
     kind: Literal["differential"] = field(default="differential", kw_only=True)
-    wheel_radius: float = bounded(low=1e-3, high=1.0, doc="[m]")
-    half_track: float = bounded(low=1e-3, high=1.0, doc="[m] half the wheel distance")
-    max_wheel_speed: float = bounded(low=1e-2, high=100.0, doc="[rad/s]")
-    wheel_mass: float = bounded(low=1e-4, high=50.0, doc="[kg] of one wheel")
-    wheel_torque: float = bounded(low=1e-4, high=100.0, doc="[Nm] greatest motor torque")
+    wheel_radius: float = bounded(low=1e-3, high=1.0, doc="Radius of a wheel (m)")
+    half_track: float = bounded(low=1e-3, high=1.0, doc="Half the distance between the wheels (m)")
+    max_wheel_speed: float = bounded(low=1e-2, high=100.0, doc="Greatest speed of a wheel (rad/s)")
+    wheel_mass: float = bounded(low=1e-4, high=50.0, doc="Mass of one wheel (kg)")
+    wheel_torque: float = bounded(low=1e-4, high=100.0, doc="Greatest torque of a motor (Nm)")
     wheel_inertia: float = bounded(
-        0.0, low=0.0, high=100.0, doc="[kg m^2] about the axle, with its geared motor; 0: a ball's"
+        0.0,
+        low=0.0,
+        high=100.0,
+        doc="Inertia of a wheel with its geared motor (kg m^2); 0: that of a solid ball",
     )
-    wheel_friction: float = bounded(1.0, low=0.0, high=3.0, doc="wheel on floor")
+    wheel_friction: float = bounded(
+        1.0, low=0.0, high=3.0, doc="Friction coefficient of wheel and floor"
+    )
 
 
 @settings
@@ -29,23 +34,29 @@ class TorqueDrive(DifferentialDrive):
     """Two wheels whose torque is controlled, as on the Pioneer of section 2.3."""
 
     kind: Literal["torque"] = field(default="torque", kw_only=True)
-    wheel_radius: float = bounded(low=1e-3, high=1.0, doc="[m] r")
-    half_track: float = bounded(low=1e-3, high=1.0, doc="[m] l, half the wheel distance")
-    max_wheel_speed: float = bounded(low=1e-2, high=100.0, doc="[rad/s]")
-    max_torque: float = bounded(low=1e-4, high=1000.0, doc="[Nm] at one wheel")
-    wheel_mass: float = bounded(low=1e-4, high=50.0, doc="[kg] of one wheel")
-    wheel_inertia: float = bounded(low=1e-9, high=100.0, doc="[kg m^2] I_w about the axle")
-    wheel_friction: float = bounded(1.0, low=0.0, high=3.0, doc="mu, wheel on floor")
+    wheel_radius: float = bounded(low=1e-3, high=1.0, doc="Radius r of a wheel (m)")
+    half_track: float = bounded(
+        low=1e-3, high=1.0, doc="Half the distance l between the wheels (m)"
+    )
+    max_wheel_speed: float = bounded(low=1e-2, high=100.0, doc="Greatest speed of a wheel (rad/s)")
+    max_torque: float = bounded(low=1e-4, high=1000.0, doc="Greatest torque at one wheel (Nm)")
+    wheel_mass: float = bounded(low=1e-4, high=50.0, doc="Mass of one wheel (kg)")
+    wheel_inertia: float = bounded(
+        low=1e-9, high=100.0, doc="Inertia I_w of a wheel about the axle (kg m^2)"
+    )
+    wheel_friction: float = bounded(
+        1.0, low=0.0, high=3.0, doc="Friction coefficient mu of wheel and floor"
+    )
 
 
 @settings
 class HolonomicDrive:
-    """Traction in any direction, as of a disc of a swarm."""
+    """Traction in any direction, as for a disc of a swarm."""
 
     kind: Literal["holonomic"] = field(default="holonomic", kw_only=True)
-    max_speed: float = bounded(low=1e-3, high=100.0, doc="[m/s] in any direction")
-    max_turn_rate: float = bounded(low=1e-2, high=1000.0, doc="[rad/s]")
-    max_force: float = bounded(low=1e-3, high=10000.0, doc="[N] of its traction")
+    max_speed: float = bounded(low=1e-3, high=100.0, doc="Greatest speed in any direction (m/s)")
+    max_turn_rate: float = bounded(low=1e-2, high=1000.0, doc="Greatest turn rate (rad/s)")
+    max_force: float = bounded(low=1e-3, high=10000.0, doc="Greatest traction (N)")
 
     def saturate(self, vx: float, vy: float, omega: float) -> tuple[float, float, float]:
         """The feasible twist of the same direction and rotation centre: scaled by one factor."""

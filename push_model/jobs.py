@@ -1,4 +1,7 @@
-"""How the job of moving an object can end, whoever does it: one robot, a group or a swarm."""
+"""Codes and states of the job of moving an object, by one robot, a group or a swarm.
+
+docs/errors.md says what each code means and what to do.
+"""
 
 from enum import IntEnum
 
@@ -22,6 +25,9 @@ class JobError(IntEnum):
     CLOCK_RESET = 313
     NODE_LOST = 314
     TOO_HEAVY = 315
+    OBJECT_MOVED = 316
+    JOB_FORGOTTEN = 317
+    OWNER_SILENT = 318
 
 
 class JobPhase(IntEnum):
@@ -36,7 +42,7 @@ class JobPhase(IntEnum):
 
 
 class GoalRefused(Exception):
-    """A goal that cannot be taken; carries the code."""
+    """A goal that is refused; carries the code."""
 
     def __init__(self, code: JobError, message: str) -> None:
         super().__init__(message)

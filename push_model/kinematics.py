@@ -24,23 +24,23 @@ class DifferentialDrive:
 
     @property
     def max_speed(self) -> float:
-        """[m/s] straight ahead."""
+        """[m/s] greatest speed straight ahead."""
         return self.wheel_radius * self.max_wheel_speed
 
     @property
     def max_turn_rate(self) -> float:
-        """[rad/s] on the spot."""
+        """[rad/s] greatest turn rate in place."""
         return self.max_speed / self.half_track
 
     def wheel_speeds(self, v: float, omega: float) -> tuple[float, float]:
-        """Left and right wheel speeds [rad/s] of a twist."""
+        """Left and right wheel speeds [rad/s] for a twist."""
         return (
             (v - omega * self.half_track) / self.wheel_radius,
             (v + omega * self.half_track) / self.wheel_radius,
         )
 
     def twist(self, left: float, right: float) -> tuple[float, float]:
-        """(v, omega) of wheel speeds [rad/s]."""
+        """(v, omega) for wheel speeds [rad/s]."""
         return (
             (left + right) * self.wheel_radius / 2.0,
             (right - left) * self.wheel_radius / (2.0 * self.half_track),
@@ -52,9 +52,8 @@ class DifferentialDrive:
         return (v, omega) if need <= 1.0 else (v / need, omega / need)
 
     def follow(self, velocities: Array, headings: Array, lead: float) -> Array:
-        """Input/output linearisation: twists ``(n, 2)`` v [m/s], omega [rad/s] of robots by which
-        points ahead of their axles move at given velocities; slower, in the same directions, where
-        wheels cannot.
+        """Input/output linearisation: twists ``(n, 2)`` v [m/s], omega [rad/s] such that points
+        ahead of the robots' axles move at given velocities; scaled to the limits of the wheels.
 
         Parameters
         ----------
@@ -64,7 +63,7 @@ class DifferentialDrive:
 
         Raises
         ------
-        ValueError: lead is zero; a point on the axle cannot go sideways.
+        ValueError: lead is zero; a point on the axle cannot move sideways.
         """
         if lead == 0.0:
             raise ValueError("the controlled point must not lie on the axle (lead = 0)")

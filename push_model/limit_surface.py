@@ -100,7 +100,7 @@ class PressureLimitSurface:
         return cls(grid.reshape(-1, 2), weights, max_force)
 
     def wrench(self, twist: Array) -> Array:
-        """Coulomb friction summed over the points."""
+        """The wrench of Coulomb friction, summed over the points."""
         twist = _direction(twist)
         vx = twist[0] - twist[2] * self.points[:, 1]
         vy = twist[1] + twist[2] * self.points[:, 0]
@@ -117,7 +117,7 @@ class PressureLimitSurface:
 
 
 def _direction(twist: Array) -> Array:
-    """The twist at unit size, zero for one too small to have a direction."""
+    """The twist scaled to unit size; zero if it is too small to have a direction."""
     size = float(np.abs(twist).max())
     direction: Array = twist / size if size > 1e-100 else np.zeros(3)
     return direction

@@ -1,4 +1,4 @@
-"""One push of a plan, ready to be executed: what planner, supervisor and controller agree on."""
+"""One push of a plan, as planner, supervisor and controller use it."""
 
 from dataclasses import dataclass
 
@@ -16,8 +16,8 @@ class PushSegment:
 
     side: index of the pushed side of the object's outline. standoff: where the robot's approach
     begins. k_start, k_end [m]: tangent lengths of (2.4). length [m] of the robot's curve. limits:
-    stable curvatures for an object that sits at its nominal place. clearance [m] of robot and
-    object along the way; infinite where it is not known.
+    stable curvatures for an object at its nominal place. clearance [m] of robot and object along
+    the path; infinite if unknown.
     """
 
     side: int

@@ -1,9 +1,9 @@
 """Where a robot with a flat bumper can push an object, convex or not.
 
-A flat face touches an outline along a line of its convex hull, or within a recess that the robot
-fits into. On a line of the hull it may span a recess that is narrower than the face: then it pushes
-on what lies on either side of it, at the least on two vertices. Into a recess it comes straight
-from behind, so all that the robot sweeps on the way must be free.
+A flat face touches an outline along a line of its convex hull, or inside a recess into which the
+robot fits. On a line of the hull the face may span a narrower recess. It then pushes on both sides
+of the recess, at least on two vertices. Into a recess the robot drives straight from behind, so the
+area that it sweeps must be free.
 """
 
 import math
@@ -15,10 +15,10 @@ from push_model.outlines import convex_hull
 from push_model.shapes import Shape, Side
 from push_model.specs import RobotSpec
 
-_SPAN = 0.9  # of the face's width: the widest gap that it spans
-_CONTACT = 0.25  # of the face or of the side, whichever is shorter: the least that must touch
+_SPAN = 0.9  # of the face's width: widest gap that the face spans
+_CONTACT = 0.25  # of the shorter of face and side: least length in contact
 _TOUCH = 1e-6  # [m] of overlap that counts as touching
-_STRAIGHT = 1e-9  # of the object's size: how far off a line a vertex on it may be
+_STRAIGHT = 1e-9  # of the object's size: distance up to which a vertex lies on a line
 
 
 def pushable_sides(shape: Shape, robot: RobotSpec, clearance: float = 0.005) -> tuple[Side, ...]:
@@ -59,7 +59,7 @@ def _on_hull(shape: Shape, side: Side) -> bool:
 
 
 def _hull_sides(shape: Shape, width: float) -> list[Side]:
-    """What a face of this width can touch on each line of the convex hull."""
+    """The parts that a face of this width can touch on each line of the convex hull."""
     outline, n = shape.outline, len(shape.outline)
     tolerance = _STRAIGHT * shape.circumradius
     hull = convex_hull(outline)
@@ -83,10 +83,10 @@ def _hull_sides(shape: Shape, width: float) -> list[Side]:
 
 
 def _of_group(shape: Shape, group: list[int], width: float) -> list[Side]:
-    """The side over outline vertices on one line, each a bumper's width from the next at most."""
+    """The side over vertices on one line whose gaps are at most a bumper's width."""
     outline, n = shape.outline, len(shape.outline)
     if len(group) < 2:
-        return []  # a lone tip
+        return []  # a single vertex
     first, last = group[0], group[-1]
     if len(group) == 2 and last == (first + 1) % n:
         return [shape.sides[first]]
@@ -106,7 +106,7 @@ def _of_group(shape: Shape, group: list[int], width: float) -> list[Side]:
 
 
 def _best_place(side: Side, width: float) -> tuple[float, float]:
-    """[m] where the middle of the bumper goes: nearest to the centre of mass, of the widest."""
+    """[m] position of the bumper: of the widest contacts the nearest to the centre of mass."""
     rim = min(width / 2.0, side.length / 2.0)
     foot = float(-side.start @ side.tangent)
     wanted = min(max(foot, rim), side.length - rim)
@@ -146,7 +146,7 @@ def _room(
 
 
 def _swept(robot: RobotSpec, far: float) -> Array:
-    """``(n, 2)`` [m] what a robot sweeps that comes straight from ``far`` behind, convex.
+    """``(n, 2)`` [m] convex area that a robot sweeps, coming straight from ``far`` behind.
 
     Frame: along the side and into it, with the bumper's middle at the origin.
     """
@@ -156,7 +156,7 @@ def _swept(robot: RobotSpec, far: float) -> Array:
 
 
 def _blocked(swept: Array, p: Array, q: Array) -> tuple[float, float] | None:
-    """[m] shifts along the first axis, from and to, by which a convex outline meets a segment."""
+    """[m] interval of shifts along the first axis for which a convex outline meets a segment."""
     if p[1] > q[1]:
         p, q = q, p
     low, high = max(p[1], float(swept[:, 1].min())), min(q[1], float(swept[:, 1].max()))
@@ -177,7 +177,7 @@ def _blocked(swept: Array, p: Array, q: Array) -> tuple[float, float] | None:
 
 
 def _across(outline: Array, level: float) -> tuple[float, float]:
-    """[m] from where to where a convex outline is cut by a line of constant second coordinate."""
+    """[m] interval of a convex outline on a line of constant second coordinate."""
     cuts = []
     for p, q in zip(outline, np.roll(outline, -1, axis=0), strict=True):
         if min(p[1], q[1]) <= level <= max(p[1], q[1]):

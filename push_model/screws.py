@@ -1,4 +1,4 @@
-"""Motions of a body with one constant twist, and the one that leads from pose to pose."""
+"""Screw motions: motions with one constant twist, and the one between two poses."""
 
 import math
 
@@ -15,7 +15,7 @@ def point_velocities(twist: Array, points: Array) -> Array:
 
 
 def screw_poses(start: Array, motion: Array, part: Array) -> Array:
-    """Poses ``(k, 3)`` after parts ``(k,)`` of a motion with one twist, headings continuous."""
+    """Poses ``(k, 3)`` after fractions ``(k,)`` of a screw motion, headings continuous."""
     angle = motion[2] * part
     sine, rest = np.sinc(angle / math.pi), _versine(angle)
     x = part * (sine * motion[0] - rest * motion[1])
@@ -25,8 +25,7 @@ def screw_poses(start: Array, motion: Array, part: Array) -> Array:
 
 
 def screw_between(start: Array, goal: Array) -> Array:
-    """The motion ``(3,)`` in the frame at start that leads from there to a goal with one twist, by
-    the shorter turn."""
+    """The screw motion ``(3,)``, in the frame at start, from start to goal by the shorter turn."""
     local = se2.between(start, goal)
     angle = float(local[2])
     sine, rest = float(np.sinc(angle / math.pi)), float(_versine(np.array([angle]))[0])

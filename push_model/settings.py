@@ -2,11 +2,11 @@
 
 ``@settings`` makes a class a frozen dataclass that pydantic checks whenever it is built, from a
 file or in code. A field may carry bounds, put there with ``bounded``. Checks across fields go into
-``__post_init__`` and raise ``SettingsError``. A union of settings classes is told apart by their
-field ``kind``, a ``Literal`` with that default.
+``__post_init__`` and raise ``SettingsError``. The member of a union of settings
+classes is chosen by its field ``kind``, a ``Literal`` with that default.
 
-Nothing is guessed: a number is no text and no truth value, infinities and nan are no numbers. A
-whole number will do where a number is wanted, and a list where a tuple is.
+Types are strict: text and truth values are no numbers, and infinities and nan are refused. An
+integer is accepted for a float, and a list for a tuple.
 """
 
 import dataclasses
@@ -39,7 +39,7 @@ def bounded(
     high: float = math.inf,
     doc: str = "",
 ) -> Any:
-    """A dataclass field with a value in [low, high]; ``doc`` says what it is, in which unit.
+    """A dataclass field with a value in [low, high]; ``doc`` gives meaning and unit.
 
     Bounds hold for each number of a tuple, and for an optional number when it is given.
     """
@@ -85,7 +85,7 @@ class _ToldByKey:
 
 
 def told_by_key(*kinds: str) -> Any:
-    """Lets ``{rectangle: {...}}`` say ``{kind: rectangle, ...}``; put it in ``Annotated``."""
+    """Accept ``{rectangle: {...}}`` for ``{kind: rectangle, ...}``; used within ``Annotated``."""
     return _ToldByKey(kinds)
 
 
@@ -139,8 +139,8 @@ def from_mapping(cls: type[T], values: Mapping[str, Any] | None, where: str = "s
 
     Raises
     ------
-    SettingsError: unknown or missing key, wrong type, out of range; says what was expected. A
-        line for each thing that is wrong.
+    SettingsError: unknown or missing key, wrong type, out of range; says what was expected,
+        one line for each problem.
     """
     if "__pydantic_validator__" not in vars(cls):
         raise TypeError(f"{cls.__name__} is not made by @settings")
@@ -155,7 +155,7 @@ def from_mapping(cls: type[T], values: Mapping[str, Any] | None, where: str = "s
 
 
 def _checked(hint: Any, low: float = -math.inf, high: float = math.inf) -> Any:
-    """The type with what pydantic shall check of it and of what is in it."""
+    """The type with the checks that pydantic applies to it and to its elements."""
     origin, inner = typing.get_origin(hint), typing.get_args(hint)
     if origin is Annotated:
         return Annotated[_checked(inner[0], low, high), *inner[1:]]

@@ -1,4 +1,4 @@
-"""What is wrong with settings, said so that it can be found and mended."""
+"""Error messages for settings: where the problem is, and what was expected."""
 
 import dataclasses
 import math
@@ -19,7 +19,7 @@ _TYPES = {
     "dataclass_type": "a mapping",
     "model_attributes_type": "a mapping",
 }
-"""Pydantic's kinds of error to what was expected."""
+"""Expected value for each of pydantic's kinds of error."""
 
 
 class SettingsError(ValueError):
@@ -29,11 +29,11 @@ class SettingsError(ValueError):
 def explained(
     error: pydantic.ValidationError, cls: type[Any], values: Any, where: str
 ) -> SettingsError:
-    """The error of a settings class, a line for each thing that is wrong.
+    """The error of a settings class, with one line for each problem.
 
     Parameters
     ----------
-    cls: that was to be built. values: from these. where: they come from.
+    cls: class to be built. values: its arguments. where: their source.
     """
     lines = [_line(e, cls, values, where) for e in error.errors(include_url=False)]
     return SettingsError("\n".join(dict.fromkeys(lines)))
@@ -74,10 +74,10 @@ def _line(error: Any, cls: type[Any], values: Any, where: str) -> str:
 def _place(
     hint: Any, value: Any, path: str, parts: tuple[Any, ...]
 ) -> tuple[str, Any, Mapping[str, Any]]:
-    """Path, type and field metadata of what pydantic names by the parts of its location.
+    """Path, type and field metadata for a location of pydantic.
 
-    Pydantic puts the kind of a union's member among the parts; the path has it only where the file
-    has it too.
+    Pydantic includes the kind of a union's member in the location; the path has it only if the
+    file has it.
     """
     metadata: Mapping[str, Any] = {}
     for part in parts:

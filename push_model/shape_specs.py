@@ -1,6 +1,6 @@
-"""Shapes as files write them: ``{rectangle: {length: 0.09, width: 0.09}}``, told by their key.
+"""Shapes in files: ``{rectangle: {length: 0.09, width: 0.09}}``, chosen by their key.
 
-``{kind: rectangle, length: 0.09, width: 0.09}`` says the same.
+``{kind: rectangle, length: 0.09, width: 0.09}`` means the same.
 """
 
 from dataclasses import field
@@ -17,8 +17,8 @@ class RectangleShape:
     """A rectangle; its frame is in the middle."""
 
     kind: Literal["rectangle"] = field(default="rectangle", kw_only=True)
-    length: float = bounded(low=1e-4, high=100.0, doc="[m] along x")
-    width: float = bounded(low=1e-4, high=100.0, doc="[m] along y")
+    length: float = bounded(low=1e-4, high=100.0, doc="Size along x (m)")
+    width: float = bounded(low=1e-4, high=100.0, doc="Size along y (m)")
 
     def shape(self) -> Shape:
         """The shape."""
@@ -31,7 +31,7 @@ class PolygonShape:
 
     kind: Literal["polygon"] = field(default="polygon", kw_only=True)
     vertices: tuple[tuple[float, float], ...] = bounded(
-        low=-100.0, high=100.0, doc="[m] in order, either way round"
+        low=-100.0, high=100.0, doc="Corners in order, clockwise or counter-clockwise (m)"
     )
 
     def __post_init__(self) -> None:
@@ -47,8 +47,8 @@ class EllipseShape:
     """An ellipse; its frame is in the middle."""
 
     kind: Literal["ellipse"] = field(default="ellipse", kw_only=True)
-    semi_axis_x: float = bounded(low=1e-4, high=100.0, doc="[m]")
-    semi_axis_y: float = bounded(low=1e-4, high=100.0, doc="[m]")
+    semi_axis_x: float = bounded(low=1e-4, high=100.0, doc="Semi-axis along x (m)")
+    semi_axis_y: float = bounded(low=1e-4, high=100.0, doc="Semi-axis along y (m)")
 
     def shape(self) -> Shape:
         """The shape."""
@@ -60,9 +60,9 @@ class FlowerShape:
     """r(phi) = radius + amplitude cos(petals phi)."""
 
     kind: Literal["flower"] = field(default="flower", kw_only=True)
-    radius: float = bounded(low=1e-4, high=100.0, doc="[m]")
-    amplitude: float = bounded(low=0.0, high=100.0, doc="[m]")
-    petals: int = bounded(low=2, high=60, doc="how many")
+    radius: float = bounded(low=1e-4, high=100.0, doc="Mean radius (m)")
+    amplitude: float = bounded(low=0.0, high=100.0, doc="Amplitude of the petals (m)")
+    petals: int = bounded(low=2, high=60, doc="Number of petals")
 
     def __post_init__(self) -> None:
         self.shape()
@@ -88,6 +88,6 @@ def shape_from_mapping(values: Any) -> Shape:
 
     Raises
     ------
-    SettingsError: no known kind, wrong sizes; says which and what was expected.
+    SettingsError: unknown kind or wrong sizes; names them and what was expected.
     """
     return from_mapping(_Shaped, {"shape": values}, "").shape.shape()

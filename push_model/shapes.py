@@ -17,13 +17,13 @@ from push_model.settings import SettingsError
 class Side:
     """A flat side of an object, in the object frame.
 
-    index: number of the side; it starts at outline vertex ``index``. One that spans a recess of a
-        concave outline of n vertices has n added.
+    index: number of the side, which starts at that vertex; plus n for a side that spans a recess
+        of a concave outline of n vertices.
     start, end: ``(2,)`` [m] its ends, counter-clockwise.
-    supports: [m] along it, from and to, where there is something to push on, e.g. the two tips of a
-        U; everywhere when empty.
-    room: [m] along it, from and to, where the middle of the bumper fits; everywhere when None.
-    depth: [m] that the object reaches back beside the pusher, which must back out so far.
+    supports: [m] intervals along it where the object can be pushed, e.g. the two tips of a U;
+        everywhere if empty.
+    room: [m] interval along it for the middle of the bumper; everywhere if None.
+    depth: [m] by which the object extends back beside the pusher, which must back out that far.
     """
 
     index: int
@@ -62,7 +62,7 @@ class Side:
         return float(-self.start @ self.inward_normal)
 
     def touched(self, low: float, high: float) -> tuple[float, float] | None:
-        """[m] along the side, the ends of what a bumper from ``low`` to ``high`` touches."""
+        """[m] interval along the side that a bumper from ``low`` to ``high`` touches."""
         supports = self.supports or ((0.0, self.length),)
         parts = [(max(a, low), min(b, high)) for a, b in supports if a <= high and b >= low]
         return (parts[0][0], parts[-1][1]) if parts else None
@@ -128,7 +128,7 @@ class Shape:
 
 
 def densified(outline: Array, spacing: float) -> Array:
-    """``(m, 2)`` [m] points of a closed outline ``(n, 2)``, vertices included, so far apart."""
+    """``(m, 2)`` [m] points of a closed outline ``(n, 2)``, vertices included, at this spacing."""
     points = []
     for a, b in zip(outline, np.roll(outline, -1, axis=0), strict=True):
         n = max(1, math.ceil(float(np.hypot(*(b - a))) / spacing))
@@ -206,7 +206,7 @@ def _centroid(points: Array) -> Array:
 
 
 def _crosses_itself(points: Array) -> bool:
-    """Whether two sides that are no neighbours meet; sides on one line may lie apart."""
+    """Whether two sides that are not neighbours meet."""
     n = len(points)
     ends = np.roll(points, -1, axis=0)
     a, b, c, d = points[:, None], ends[:, None], points[None], ends[None]

@@ -1,4 +1,4 @@
-"""What a robot, an object and an environment are: the typed contents of the files in config/."""
+"""Types of robots, objects and environments: the contents of the files in config/."""
 
 import math
 from dataclasses import replace
@@ -20,32 +20,41 @@ from push_model.shapes import Shape, polygon
 
 @settings
 class RobotSpec:
-    """A robot type: a round body, what moves it, and what it pushes with.
+    """A robot type: a round body, its drive and its bumper.
 
-    Its frame is at the axle midpoint, x ahead; that of a holonomic one is in the middle. What is
-    left out is filled in when it is built: the height of the bumper's middle (the axle's; half
-    the body's without wheels) and the casters (before and behind; none without wheels).
+    Its frame is at the axle midpoint with x forward; for a holonomic robot, at the middle. Missing
+    values are filled in on construction: the height of the bumper's middle (that of the axle, or
+    half the body's without wheels) and the casters (front and rear, or none without wheels).
     """
 
     drive: Drive
     bumper: Bumper
-    body_radius: float = bounded(low=1e-3, high=2.0, doc="[m]")
-    body_height: float = bounded(low=1e-3, high=2.0, doc="[m]")
-    mass: float = bounded(low=1e-3, high=500.0, doc="[kg] in all")
+    body_radius: float = bounded(low=1e-3, high=2.0, doc="Radius of the body (m)")
+    body_height: float = bounded(low=1e-3, high=2.0, doc="Height of the body (m)")
+    mass: float = bounded(low=1e-3, high=500.0, doc="Total mass (kg)")
     com_ahead: float = bounded(
-        0.0, low=-2.0, high=2.0, doc="[m] d, centre of mass of the body, ahead of the axle"
+        0.0,
+        low=-2.0,
+        high=2.0,
+        doc="Position of the body's centre of mass, positive ahead of the axle (m)",
     )
     inertia: float | None = bounded(
         None,
         low=1e-9,
         high=1000.0,
-        doc="[kg m^2] I_r about the vertical through the centre of mass",
+        doc="Inertia I_r about the vertical axis through the centre of mass (kg m^2)",
     )
     casters: tuple[float, ...] | None = bounded(
-        None, low=-2.0, high=2.0, doc="[m] x of each, ahead of the axle"
+        None, low=-2.0, high=2.0, doc="Position of each caster, positive ahead of the axle (m)"
     )
     caster_clearance: float = bounded(
-        2e-4, low=0.0, high=0.1, doc="[m] of casters above the floor at rest"
+        2e-4, low=0.0, high=0.1, doc="Height of the casters above the floor at rest (m)"
+    )
+    robot_friction: float = bounded(
+        1.0,
+        low=0.01,
+        high=2.0,
+        doc="Friction coefficient between two robots of this type (dimensionless).",
     )
 
     def __post_init__(self) -> None:
@@ -67,12 +76,12 @@ class RobotSpec:
 
     @property
     def kinematics(self) -> DifferentialDrive | None:
-        """Of its two wheels; None when it moves in any direction."""
+        """Kinematics of its two wheels; None if it moves in any direction."""
         return self.drive if isinstance(self.drive, DifferentialDrive) else None
 
     @property
     def differential(self) -> DifferentialDrive:
-        """Kinematics of its two wheels, for what can do nothing else.
+        """Kinematics of its two wheels, for callers that support nothing else.
 
         Raises
         ------
@@ -86,7 +95,7 @@ class RobotSpec:
 
     @property
     def flat_bumper(self) -> FlatBumper:
-        """Its bumper, for what can push with nothing but a flat one.
+        """Its bumper, for callers that support only a flat one.
 
         Raises
         ------
@@ -103,7 +112,7 @@ class RobotSpec:
 
     @property
     def max_turn_rate(self) -> float:
-        """[rad/s] on the spot."""
+        """[rad/s] of a turn in place."""
         return self.drive.max_turn_rate
 
     @property
@@ -119,7 +128,7 @@ class RobotSpec:
 
     @property
     def lever(self) -> float:
-        """[m] from the frame to what moves it: a turn of 1 rad moves that so far."""
+        """[m] distance by which a turn of 1 rad moves the wheels (or the rim without wheels)."""
         return self.body_radius if self.kinematics is None else self.kinematics.half_track
 
     @property
@@ -145,21 +154,32 @@ class ObjectSpec:
     """
 
     shape: ShapeSpec
-    mass: float = bounded(low=1e-3, high=500.0, doc="[kg]")
-    height: float = bounded(low=5e-3, high=2.0, doc="[m]")
-    floor_friction: float = bounded(low=0.01, high=2.0, doc="object on floor")
-    contact_friction: float = bounded(low=0.0, high=2.0, doc="robot on object")
-    feet: int = bounded(4, low=3, high=16, doc="number of soft feet, see docs/physics.md")
+    mass: float = bounded(low=1e-3, high=500.0, doc="Mass of the object (kg)")
+    height: float = bounded(low=5e-3, high=2.0, doc="Height of the object (m)")
+    floor_friction: float = bounded(
+        low=0.01, high=2.0, doc="Friction coefficient of object and floor"
+    )
+    contact_friction: float = bounded(
+        low=0.0, high=2.0, doc="Friction coefficient of bumper and object"
+    )
+    feet: int = bounded(
+        4, low=3, high=16, doc="Number of soft feet in simulation, see docs/physics.md"
+    )
     com: tuple[float, float] = bounded(
-        (0.0, 0.0), low=-100.0, high=100.0, doc="[m] centre of mass in the geometric frame"
+        (0.0, 0.0), low=-100.0, high=100.0, doc="Centre of mass in the geometric frame (m)"
     )
     inertia: float | None = bounded(
-        None, low=1e-9, high=1e6, doc="[kg m^2] about the centre of mass; by default uniform"
+        None,
+        low=1e-9,
+        high=1e6,
+        doc="Inertia about the centre of mass (kg m^2); default: that of uniform density",
     )
 
     def __post_init__(self) -> None:
         if not inside_convex(convex_hull(self.outline), np.array([self.com]))[0]:
-            raise SettingsError(f"com {self.com} must lie within the object, which else tips over")
+            raise SettingsError(
+                f"com {self.com} must lie within the object, which would tip over otherwise"
+            )
 
     @cached_property
     def geometry(self) -> Shape:
@@ -212,7 +232,7 @@ class CircleSpec:
     """A round obstacle."""
 
     centre: tuple[float, float]
-    radius: float = bounded(low=1e-3, high=100.0, doc="[m]")
+    radius: float = bounded(low=1e-3, high=100.0, doc="Radius of the obstacle (m)")
 
 
 @settings
@@ -224,15 +244,17 @@ class PolygonSpec:
 
 @settings
 class EnvironmentSpec:
-    """An arena centred on the origin with walls all round and obstacles inside."""
+    """An arena centred on the origin, with walls around it and obstacles inside."""
 
     size: tuple[float, float]
     boxes: tuple[BoxSpec, ...] = ()
     circles: tuple[CircleSpec, ...] = ()
     polygons: tuple[PolygonSpec, ...] = ()
-    resolution: float = bounded(0.01, low=1e-3, high=0.5, doc="[m] of the occupancy grid")
-    wall_height: float = bounded(0.1, low=0.01, high=5.0, doc="[m]")
-    wall_friction: float = bounded(0.3, low=0.0, high=2.0, doc="robot or object on wall")
+    resolution: float = bounded(0.01, low=1e-3, high=0.5, doc="Cell size of the occupancy grid (m)")
+    wall_height: float = bounded(0.1, low=0.01, high=5.0, doc="Height of the walls (m)")
+    wall_friction: float = bounded(
+        0.3, low=0.0, high=2.0, doc="Friction coefficient of robot or object and wall"
+    )
 
     def __post_init__(self) -> None:
         if not all(math.isfinite(s) and s > 0.0 for s in self.size):

@@ -1,12 +1,12 @@
-"""Stable pushes: motions of a pusher under which the pushed object stays fixed to it.
+"""Stable pushes: motions of a pusher during which the object does not move relative to it.
 
 Lynch & Mason (1996). The pusher frame has x along the pushing direction and its origin at the
 middle of the bumper; the object's side lies on x = 0. A differential drive rotates about points of
 its axle line x = -axle_distance, which turns the region of stable rotation centres into limits on
 the curvature of the robot's path (section 2.1.1, Fig. 2.2).
 
-Two answers are given. ``curvature_limits`` is exact for a known limit surface. With one whose
-force direction follows the centre of mass (the ellipsoid) the friction limit has a closed form:
+There are two methods. ``curvature_limits`` is exact for a known limit surface. If the direction of
+its force is that of the centre of mass (the ellipsoid), the friction limit has a closed form:
 the centre of mass, at (axle_distance + a, y) from the axle midpoint, moves along
 (1 - kappa y, kappa (axle_distance + a)), which must lie in the friction cone. For the centred
 object that is 1/kappa = (a + axle_distance)/mu; an offset y adds to the radius, as in (2.54).
@@ -56,7 +56,7 @@ class CurvatureLimits:
     maximum: float
 
     def scaled(self, factor: float) -> "CurvatureLimits":
-        """The limits of a contact that is trusted only to a fraction, 0 < factor <= 1."""
+        """The limits scaled by a fraction 0 < factor <= 1."""
         return CurvatureLimits(self.minimum * factor, self.maximum * factor)
 
 
@@ -96,7 +96,7 @@ def contact_margins(
     friction: float,
     surface: LimitSurface,
 ) -> tuple[float, float]:
-    """How far a motion is from slipping and from tipping over an end of the contact.
+    """Margins of a motion against slipping and against pivoting about an end of the contact.
 
     Returns
     -------
@@ -105,7 +105,7 @@ def contact_margins(
     """
     x, y = axle_distance + contact.centre[0], contact.centre[1]
     vx, vy = 1.0 - curvature * y, curvature * x
-    # The limit surface is the object's own: ask it in the object's frame.
+    # The limit surface is defined in the object's frame.
     c, s = math.cos(contact.heading), math.sin(contact.heading)
     ox, oy, torque = surface.wrench(np.array([c * vx + s * vy, -s * vx + c * vy, curvature]))
     fx, fy = c * ox - s * oy, s * ox + c * oy
@@ -146,7 +146,7 @@ def curvature_limits(
 
     def edge(sign: float) -> float:
         inside, outside = 0.0, sign * tightest
-        for factor in np.geomspace(1e-3, 1.0, 60):  # the first loss of stability, not any
+        for factor in np.geomspace(1e-3, 1.0, 60):  # find the first loss of stability
             if not stable(sign * tightest * factor):
                 outside = sign * tightest * factor
                 break

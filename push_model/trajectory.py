@@ -58,10 +58,10 @@ class Trajectory:
 
 
 def ramp(distance: float, top: float, acceleration: float, step: float) -> tuple[Array, Array]:
-    """A trapezoidal rest-to-rest motion over a distance [m], sampled every ``step`` [s] or less.
+    """A rest-to-rest motion with trapezoidal speed over a distance [m].
 
-    top, acceleration: at most, [m/s], [m/s^2] (or with angles instead of lengths). Returns time [s]
-    and way [m] ``(n, 2)``, and speed [m/s] ``(n,)``.
+    top, acceleration: limits [m/s], [m/s^2] (or angles instead of lengths). step: [s] between
+    samples at most. Returns time [s] and distance [m] ``(n, 2)``, and speed [m/s] ``(n,)``.
     """
     peak = min(top, math.sqrt(distance * acceleration))
     rise = peak / acceleration
@@ -101,7 +101,7 @@ def line(
 def rotation(
     start: Array, angle: float, turn_rate: float, acceleration: float, step: float = 0.05
 ) -> Trajectory:
-    """On the spot from a pose ``(3,)`` by an angle [rad]."""
+    """A turn in place from a pose ``(3,)`` by an angle [rad]."""
     way, rate = ramp(max(abs(angle), 1e-6), turn_rate, acceleration, step)
     sign = math.copysign(1.0, angle)
     pose = np.column_stack(
@@ -145,7 +145,7 @@ def along_curve(
 
 
 def concatenate(parts: Sequence[Trajectory]) -> Trajectory:
-    """One trajectory after the other; each part starts where and how the one before ends."""
+    """One trajectory after another; each begins in the pose in which the previous one ends."""
     time, pose, twist = [parts[0].time], [parts[0].pose], [parts[0].twist]
     for part in parts[1:]:
         turns = round((pose[-1][-1, 2] - part.pose[0, 2]) / (2.0 * math.pi))

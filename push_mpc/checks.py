@@ -1,4 +1,4 @@
-"""When a task is done, and when it has gone wrong."""
+"""Checks for the end and for the failure of a task."""
 
 from collections import deque
 
@@ -13,13 +13,13 @@ from push_mpc.task import Task, TrackError
 Verdict = tuple[TrackError, str]
 FINE: Verdict = (TrackError.NONE, "")
 
-_ALONG = 0.5  # of the tolerance: a push goes on until so little is left along its way
-_NEARLY = 3.0  # times the tolerances: what is left then is the next plan's to mend, not a failure
-_MOVED = 0.1  # of the commanded way: wheels that slip a lot still do better
+_ALONG = 0.5  # of the tolerance: a push continues until this much is left along its path
+_NEARLY = 3.0  # times the tolerances: a smaller error is left to the next plan and is no failure
+_MOVED = 0.1  # of the commanded distance: even slipping wheels achieve more
 
 
 class EndCheck:
-    """Whether what counts has come to rest where it should, or is not worth waiting for."""
+    """Whether the tracked body has come to rest at its end, or the wait for it is over."""
 
     def __init__(self, settings: TrackerSettings, task: Task) -> None:
         self._settings = settings
@@ -31,19 +31,19 @@ class EndCheck:
     ) -> bool:
         """Whether to end, after dt [s] more without a reference.
 
-        along: [m] that the robot is behind its end. gap, turn: [m], [rad] of what counts to there.
+        along: [m] that the robot is behind its end. gap, turn: [m], [rad] of the tracked body.
         """
         self._overtime += dt
         s = self._settings
         slow = abs(v) < s.rest_speed and abs(omega) < s.rest_turn_rate
         late = self._overtime > s.settle_time
         if self._task.push is not None:
-            # A push cannot be undone: what is left across the way stays.
+            # A push cannot be undone: a lateral error stays.
             return (slow and along < _ALONG * self._task.position_tolerance) or late
         return (slow and self._within(gap, turn, 1.0)) or late
 
     def verdict(self, gap: float, turn: float) -> Verdict:
-        """Of a task that has ended."""
+        """Verdict on a task that has ended."""
         late = self._overtime > self._settings.settle_time
         if late and not self._within(gap, turn, _NEARLY):
             return TrackError.TIMEOUT, f"ended {1e3 * gap:.1f} mm and {turn:.3f} rad off"
@@ -55,9 +55,9 @@ class EndCheck:
 
 
 class FailureCheck:
-    """Off course, contact lost, blocked, stuck; in this order.
+    """Checks for off course, contact lost, blocked and stuck, in this order.
 
-    lever: [m] by which turning counts as moving, that of the wheels.
+    lever: [m] by which a turn is converted into a distance; that of the wheels.
     """
 
     def __init__(self, settings: TrackerSettings, lever: float) -> None:

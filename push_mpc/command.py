@@ -7,9 +7,9 @@ from push_mpc.settings import TrackerSettings
 
 
 class Command:
-    """v [m/s] and omega [rad/s], and how the solves behind them went.
+    """v [m/s] and omega [rad/s], with counters of the solves.
 
-    solves, failures: since it was made; failed: in a row.
+    solves, failures: since construction; failed: in a row.
     """
 
     def __init__(self, settings: TrackerSettings, drive: DifferentialDrive) -> None:
@@ -28,7 +28,7 @@ class Command:
         return self.failed >= self._settings.solver_patience
 
     def start(self) -> None:
-        """A new task: no failure in a row yet."""
+        """Begin a new task: reset the failures in a row."""
         self.failed, self._faded = 0, 1.0
 
     def stop(self) -> None:
@@ -36,7 +36,7 @@ class Command:
         self.v = self.omega = 0.0
 
     def apply(self, solve: MpcResult, dt: float, limits: CurvatureLimits | None) -> None:
-        """Integrate over dt [s]; without a solution stop, when it is only late fade."""
+        """Integrate over dt [s]; stop without a solution, fade if it is only late."""
         self.solves += 1
         if not solve.solved:
             self.failures += 1

@@ -1,4 +1,4 @@
-"""What every predictive controller offers to the tracker."""
+"""The protocol between predictive controllers and the tracker."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -11,7 +11,7 @@ from push_mpc.line_contact import LineContact
 
 @dataclass(frozen=True)
 class Reference:
-    """What to track over the horizon.
+    """The reference over the horizon.
 
     pose: ``(p + 1, 3)`` world frame; twist: ``(p + 1, 3)`` v_d, w_d, omega_d of that frame, in it.
     """
@@ -22,9 +22,9 @@ class Reference:
 
 @dataclass(frozen=True)
 class Contact:
-    """What holds the object at the bumper, now.
+    """The present contact of object and bumper.
 
-    limits: stable curvatures. line: where the forces act; None where it is not known.
+    limits: stable curvatures. line: where the forces act; None if unknown.
     """
 
     limits: CurvatureLimits
@@ -35,9 +35,9 @@ class Contact:
 class MpcResult:
     """acceleration: (a, epsilon) to apply now; solve_time [s] CPU.
 
-    slack: greatest violation of a softened row, as a part of what is allowed: 1 is at the bound.
-    solved is False when the acceleration must not be used; reason says why. late: only because it
-    came after its deadline.
+    slack: greatest violation of a soft constraint as a fraction of what is allowed.
+    solved is False if the acceleration must not be used; reason says why. late: the only reason
+    is that the solution came after its deadline.
     """
 
     acceleration: tuple[float, float]
@@ -53,22 +53,22 @@ class PredictiveController(Protocol):
 
     @property
     def drive(self) -> DifferentialDrive:
-        """Of the robot."""
+        """Kinematics of the robot."""
         ...
 
     @property
     def horizon(self) -> int:
-        """p, steps predicted."""
+        """p, number of predicted steps."""
         ...
 
     @property
     def step(self) -> float:
-        """[s] of the prediction."""
+        """[s] length of a predicted step."""
         ...
 
     @property
     def max_obstacles(self) -> int:
-        """How many circles it takes."""
+        """Greatest number of circles that it takes."""
         ...
 
     def solve(

@@ -1,4 +1,4 @@
-"""The predictive controllers by name: a file each, and a line here."""
+"""The predictive controllers by name: one file each, and a line here."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ def controller_kind(name: str) -> ControllerKind:
 
     Raises
     ------
-    SettingsError: there is none.
+    SettingsError: no such controller.
     """
     if name not in CONTROLLERS:
         raise SettingsError(

@@ -1,8 +1,8 @@
-"""Where a robot is now: its measured pose is late, or missing in a frame; its commands are known.
+"""Dead reckoning: the present pose of a robot from a late or missing measurement and its commands.
 
-Time runs back from now. A frame shows the world as it was ``delay`` ago; a pose that is ``age``
-older than its frame was measured delay + age ago. The command of a tick is in force from then
-until the next tick.
+Times count back from now. A frame shows the world as it was ``delay`` ago. A pose that is ``age``
+older than its frame was measured delay + age ago. A command is in force from its tick until the
+next one.
 """
 
 from collections import deque
@@ -10,14 +10,14 @@ from collections import deque
 from push_model.arrays import Array
 from push_model.kinematics import unicycle_step
 
-_SHORTEST = 1e-9  # [s]: what rounding leaves of an interval is none
+_SHORTEST = 1e-9  # [s]: shorter intervals are rounding errors
 
 
 class DeadReckoning:
-    """Carries poses of a unicycle forward along the commands that it was given.
+    """Predicts poses of a unicycle forward along its commands.
 
     delay: [s] from the measurement of a frame to the command that answers it. Before the first
-    command on record the robot stood still.
+    recorded command the robot is assumed at rest.
     """
 
     def __init__(self, delay: float) -> None:
@@ -26,12 +26,12 @@ class DeadReckoning:
         self._span = 0.0
 
     def clear(self) -> None:
-        """The robot has been standing still."""
+        """Assume that the robot has been at rest."""
         self._commands.clear()
         self._span = 0.0
 
     def record(self, dt: float, v: float, omega: float) -> None:
-        """The command that was in force for the last dt [s]."""
+        """Add the command that was in force for the last dt [s]."""
         self._commands.append((dt, v, omega))
         self._span += dt
 
@@ -55,7 +55,7 @@ class DeadReckoning:
         """From ``begin`` [s] ago to ``end`` [s] ago."""
         if begin - end <= 0.0:
             return pose
-        back = self._span  # how long ago this command came into force
+        back = self._span  # time since this command came into force
         for dt, v, omega in self._commands:
             step = min(back, begin) - max(back - dt, end)
             if step > _SHORTEST:

@@ -1,4 +1,4 @@
-"""Where the pushed object sits at the bumper: its pose in the robot frame, smoothed."""
+"""Estimate of the pushed object's pose in the robot frame."""
 
 import numpy as np
 
@@ -7,10 +7,10 @@ from push_model.arrays import Array
 
 
 class GraspEstimate:
-    """A first-order filter of the object's pose in the robot frame; the first one counts in full.
+    """A first-order filter of the object's pose in the robot frame, initialised by the first one.
 
-    nominal: ``(3,)`` where it should be; pose: ``(3,)`` where it is. Both poses of a measurement
-    must be of one time: in the 0.1 s that a frame is late, a robot moves on by millimetres.
+    nominal: ``(3,)`` where it should be; pose: ``(3,)`` where it is. Robot and object poses of a
+    measurement must be of the same time, because a robot moves millimetres during the latency.
     """
 
     def __init__(self, nominal: Array, time_constant: float) -> None:
@@ -21,7 +21,7 @@ class GraspEstimate:
         self._elapsed = 0.0  # [s] since the last measurement
 
     def update(self, dt: float, seen: Array | None) -> None:
-        """Let dt [s] pass, at whose end the object is seen there in the robot frame, or not."""
+        """Advance by dt [s], with the object's measured pose in the robot frame, or None."""
         self._elapsed += dt
         if seen is None:
             return
@@ -36,22 +36,22 @@ class GraspEstimate:
 
     @property
     def shift(self) -> Array:
-        """Pose ``(3,)`` of the robot frame that puts the object on its way, in the nominal one."""
+        """Pose ``(3,)`` of the robot, in its nominal frame, that puts the object on its path."""
         return se2.compose(self.nominal, se2.inverse(self.pose))
 
     @property
     def offset(self) -> float:
-        """[m] by which the object sits to the left of its nominal place, (2.54)."""
+        """[m] by which the object is to the left of its nominal place, (2.54)."""
         return float(self.pose[1] - self.nominal[1])
 
     @property
     def away(self) -> tuple[float, float]:
-        """[m] by which the object sits ahead and to the left of its nominal place."""
+        """[m] by which the object is ahead and to the left of its nominal place."""
         return float(self.pose[0] - self.nominal[0]), self.offset
 
     @property
     def apart(self) -> tuple[float, float, float]:
-        """Ahead of its place [m], aside of it (absolute) [m], turned against it (absolute)."""
+        """Deviation from its nominal place: ahead [m], lateral (absolute) [m], angle (absolute)."""
         away = self.pose - self.nominal
         return float(away[0]), abs(float(away[1])), abs(se2.wrap(float(away[2])))
 

@@ -1,4 +1,4 @@
-"""A flat bumper along an object's side, as the contact forces of section 2.4.2 need it."""
+"""The line contact of a flat bumper and a side, for the contact forces of section 2.4.2."""
 
 from dataclasses import dataclass, replace
 
@@ -10,12 +10,12 @@ from push_model.bumpers import FlatBumper
 from push_model.grasp import line_contact_grasp
 from push_model.specs import ObjectSpec, RobotSpec
 
-_TOUCH = 1e-3  # [m] off the bumper's face that an outline at its nominal place may be
+_TOUCH = 1e-3  # [m] distance from the bumper's face up to which an outline touches it
 
 
 @dataclass(frozen=True)
 class LineContact:
-    """In the robot frame, with the object at its nominal place.
+    """A line contact in the robot frame, with the object at its nominal place.
 
     face: [m] from the axle midpoint to the bumper's face. right, left: [m] y of the contact's ends.
     width: [m] of the bumper.
@@ -32,11 +32,11 @@ class LineContact:
     width: float
 
     def trusted(self, part: float) -> "LineContact":
-        """One whose friction is only so much of the believed one."""
+        """The same contact with a fraction of the believed friction."""
         return replace(self, friction=part * self.friction)
 
     def moved(self, ahead: float, aside: float) -> "LineContact":
-        """With the object [m] off its nominal place; the ends stay on the bumper."""
+        """The contact for an object [m] off its nominal place; the ends stay on the bumper."""
         half = self.width / 2.0
         right, left = max(self.right + aside, -half), min(self.left + aside, half)
         return replace(self, right=right, left=left, centre=self.centre + np.array([ahead, aside]))
@@ -45,8 +45,8 @@ class LineContact:
     def motion_of_forces(self) -> Array:
         """H G of (2.53) ``(3, 4)``: forces along the cones' edges to the object's twist.
 
-        Twist at the centre of mass in the robot's axes, up to a common factor: what the forces'
-        unit is does not matter to a quasi-static motion. Columns f_1R, f_1L, f_2R, f_2L of (2.39).
+        Twist at the centre of mass in the robot's axes, up to a common factor: the unit of the
+        forces does not matter to a quasi-static motion. Columns f_1R, f_1L, f_2R, f_2L of (2.39).
         """
         ahead, y = float(self.centre[0]) - self.face, float(self.centre[1])
         grasp = line_contact_grasp(ahead, self.right - y, self.left - y, self.friction)
@@ -55,7 +55,7 @@ class LineContact:
 
 
 def line_contact(robot: RobotSpec, item: ObjectSpec, grasp: Array) -> LineContact | None:
-    """The contact of an object at a pose ``(3,)`` in the robot frame; None where none is a line."""
+    """The contact of an object at a pose ``(3,)`` in the robot frame; None if it is no line."""
     if not isinstance(robot.bumper, FlatBumper):
         return None
     half = robot.bumper.width / 2.0

@@ -1,4 +1,4 @@
-"""LTV-MPC of section 2.4: track a reference under the stick and the obstacle constraints."""
+"""LTV-MPC of section 2.4: track a reference under curvature and obstacle constraints."""
 
 import math
 import time
@@ -60,7 +60,7 @@ class LtvMpc:
         self.reset()
 
     def _programme(self) -> Qp:
-        """The parts that no tick changes."""
+        """The constant parts of the programme."""
         s = self.settings
         p, n = s.horizon, 2 * s.horizon + SLACKS
         H, f = np.zeros((n, n)), np.zeros(n)

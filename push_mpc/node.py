@@ -13,6 +13,7 @@ from std_msgs.msg import Header
 
 from push_estimation.pose_gate import PoseGateSettings, Stamp
 from push_model.arrays import Array
+from push_model.belief import POSES
 from push_model.settings import SettingsError
 from push_mpc import (
     Push,
@@ -22,11 +23,14 @@ from push_mpc import (
     TrajectoryTracker,
     controller_kind,
 )
+from push_mpc.believed_push import Unstable, believed_push
 from push_mpc.line_contact import line_contact
 from push_mpc.settings import ControllerSettings
+from push_mpc.tick_report import tick_report
 from push_msgs.action import FollowTrajectory
-from push_msgs.msg import ControllerStatus
+from push_msgs.msg import ControllerStatus, Report
 from push_ros.actions import GoalServer
+from push_ros.belief_feed import BeliefFeed
 from push_ros.conversions import (
     circles_from_ros,
     limits_from_ros,
@@ -40,11 +44,13 @@ from push_ros.parameters import declare_settings
 from push_ros.pose_feed import Frame, PoseFeed
 from push_ros.process import run_node
 from push_ros.qos import COMMAND, STATUS
+from push_ros.report_conversions import report_to_ros
 from push_ros.validation import FRAME, InvalidMessage, check_frame, finite, planar_pose
 from push_scenario.scenario import Scenario, load_scenario
 
 _TICK = 0.01  # [s] assumed where the time since the last frame is not known
 _FEEDBACK_EVERY = 10  # frames
+_REPORTS = 0.05  # [s] of pose time between reports
 _WATCH = 0.05  # [s] wall time between looks at the pose stream
 
 
@@ -65,6 +71,7 @@ class ControllerNode(Node):
         sections = {k: values.pop(k, {}) for k in ("mpc", "tracker", "poses")}
         own = declare_settings(self, ControllerSettings, values, where="controller")
         self._spec, self._drive = spec, spec.differential
+        self._controller = own.controller
         self._kind = controller_kind(own.controller)
         self._mpc_settings = declare_settings(
             self, self._kind.settings, sections["mpc"], "mpc", "controller.mpc", self._apply_mpc
@@ -87,6 +94,7 @@ class ControllerNode(Node):
             if other != self.robot
         }
         self._object = ""
+        self._told_push: Push | None = None  # as it was planned
         self._pushing = False
         self._held = 0.0  # [s] without a pose that this task needs
         self._ticks = 0
@@ -94,6 +102,11 @@ class ControllerNode(Node):
         self._reason = "no task"
         self._mode = ControllerStatus.IDLE
         self._diagnostics = Diagnostics(self, names, self._state)
+        self._beliefs = BeliefFeed(
+            self, names, self._scenario, self._diagnostics, lambda belief: self._take_up()
+        )
+        self._reports = self.create_publisher(Report, names.robot(self.robot, "report"), STATUS)
+        self._reported = -math.inf
         topic = names.robot(self.robot, "cmd_vel")
         self._command_publisher = self.create_publisher(
             TwistStamped, topic, COMMAND, event_callbacks=self._diagnostics.publisher_events(topic)
@@ -138,6 +151,21 @@ class ControllerNode(Node):
         )
         self.tracker.warm_up()
 
+    def _take_up(self) -> None:
+        """Go on with what is believed now: a push under way too."""
+        belief, told = self._beliefs.current, self._told_push
+        delay = self._tracker_settings.pose_delay
+        if (POSES, "latency") in belief.values:
+            delay = belief.latency.value
+        push = None
+        if self.tracker.active and told is not None:
+            item, robot = belief.object(self._object), belief.robot(self.robot)
+            try:
+                push = believed_push(told, robot, item)
+            except Unstable as error:
+                self._end(FollowTrajectory.Result.SOLVER_FAILED, str(error))
+        self.tracker.believe(push, delay)
+
     def _check(self, request: Any) -> None:
         """Raise InvalidMessage unless the goal is a task."""
         self._parse(request)
@@ -158,7 +186,7 @@ class ControllerNode(Node):
             if not request.object:
                 raise InvalidMessage("a push needs its object")
             grasp = planar_pose(request.contact, "the contact")
-            item = self._scenario.object(request.object)[1]
+            item = self._beliefs.current.object(request.object)
             line = line_contact(self._spec, item, grasp)
             push = Push(grasp, limits_from_ros(request), line)
         elif request.mode != FollowTrajectory.Goal.MOVE:
@@ -180,6 +208,9 @@ class ControllerNode(Node):
         self._heartbeat.begin(heartbeat_timeout)
         self._held = 0.0
         self.tracker.start(task)
+        self._told_push = task.push
+        if self._beliefs.current.values:
+            self._take_up()
         self._mode = ControllerStatus.PUSH if task.push else ControllerStatus.MOVE
         self._reason = "following a trajectory"
 
@@ -317,6 +348,12 @@ class ControllerNode(Node):
                 message.solve_time = tick.solve.solve_time
                 message.slack = tick.solve.slack
         self._status_publisher.publish(message)
+        if tick is not None and self._poses.stamp - self._reported >= _REPORTS - 1e-9:
+            self._reported = self._poses.stamp
+            report = tick_report(tick, self._pushing)
+            self._reports.publish(
+                report_to_ros(report, self._last_stamp, self._controller, self._object)
+            )
 
     def _on_watchdog(self) -> None:
         """Wall time: the pose stream may be dead, and with it every other clock."""

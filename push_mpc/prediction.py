@@ -5,8 +5,8 @@ Its dynamics (2.38) are integrated along the previous solution; the deviation fr
 linear, discretised in closed form: with z = e_x + i e_y the homogeneous part turns z by
 exp(-i omega_d t), so the integrals in (2.47)-(2.49) are Stumpff's functions of omega_d T.
 
-The reference may also slide sideways at w_d [m/s] (a frame fixed to a pushed object that sits off
-its nominal place does), which adds -w_d to the second row of (2.38).
+The reference may also move sideways at w_d [m/s], as a frame fixed to an off-centre object does.
+That adds -w_d to the second row of (2.38).
 
 All constraints are rows on the outputs of a step, y_k = (e_{k+1}, u_k - u_{k-1}) = g_k + S_k u:
 normal . y_k <= bound + slack. Nothing wider than an output is written per row.
@@ -232,7 +232,7 @@ def condense(
 def constant_rows(
     p: int, obstacles: int, half_track: float, change: Array
 ) -> tuple[Array, Array, NDArray[np.int64]]:
-    """What never changes of the rows: normal ``(p, 7, r)``, bound ``(p, r)``, family ``(r,)``.
+    """The constant parts of the rows: normal ``(p, 7, r)``, bound ``(p, r)``, family ``(r,)``.
 
     Wheel speeds (2.50c), changes of the input (2.50b) no greater than change ``(2,)``, curvature
     (2.57), obstacles (2.61). Bounds and normals that depend on the tick are left to ``tick_rows``.
@@ -270,8 +270,7 @@ def tick_rows(
 ) -> None:
     """Rows of this tick, into normal and bound of ``constant_rows``.
 
-    In a push v >= 0 replaces the limits of the wheels backwards. A row that is not needed gets the
-    bound inf.
+    In a push, v >= 0 replaces the backward wheel limits. Unused rows get the bound inf.
 
     poses: ``(p + 1, 3)`` of the reference; circles: ``(m, 3)`` x, y, least distance of the robot.
     """

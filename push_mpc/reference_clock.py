@@ -1,4 +1,4 @@
-"""How far the reference has come: it waits for a robot that lags behind."""
+"""Time along the reference, which waits for a robot that lags behind."""
 
 import math
 
@@ -9,15 +9,15 @@ from push_model.trajectory import Trajectory
 from push_mpc.controller import Reference
 from push_mpc.settings import TrackerSettings
 
-# Of the nominal pace. Slower than that, the reference stands still: before a robot that does not
-# move it approaches lag_end for ever, and never quite comes to rest.
+# Of the nominal pace. A slower reference is stopped; otherwise it would approach lag_end for ever
+# in front of a robot that does not move.
 _HALTED = 0.02
 
 
 class ReferenceClock:
-    """The time of a trajectory, which runs slower than the clock when the robot lags behind.
+    """Time along a trajectory, which runs slower than the clock while the robot lags behind.
 
-    time: [s] of the trajectory; halted: [s] for which it has not moved on.
+    time: [s] along the trajectory; halted: [s] since it last advanced.
     """
 
     def __init__(self, settings: TrackerSettings, trajectory: Trajectory) -> None:
@@ -34,18 +34,18 @@ class ReferenceClock:
 
     @property
     def progress(self) -> float:
-        """Part of the trajectory that is over, 0 to 1."""
+        """Completed fraction of the trajectory, 0 to 1."""
         return min(1.0, self.time / self.trajectory.duration)
 
     def advance(self, dt: float, lag: float) -> None:
-        """Let dt [s] pass, with the robot lag [m] behind."""
+        """Advance by dt [s], with the robot lag [m] behind."""
         s = self._settings
         self._rate = min(1.0, max(0.0, (s.lag_end - lag) / (s.lag_end - s.lag_begin)))
         self.halted = self.halted + dt if self._rate < _HALTED and not self.ended else 0.0
         self.time = min(self.time + self._rate * dt, self.trajectory.duration)
 
     def reference(self, horizon: int, step: float, shift: Array) -> Reference:
-        """What to track from now on, at the present pace, in frames moved by shift ``(3,)``.
+        """The reference from now on, at the present pace, in frames moved by shift ``(3,)``.
 
         shift: pose of the wanted robot frame in the trajectory's frame; its twist is that of a
         frame fixed to the trajectory's, so that it slides sideways when it sits ahead in a bend.

@@ -7,50 +7,77 @@ from push_model.settings import SettingsError, bounded, settings
 
 @settings
 class ControllerSettings:
-    """Of the node itself."""
+    """Settings of the node itself."""
 
-    controller: str = bounded("ltv", doc="which predictive controller, by name")
+    controller: str = bounded("ltv", doc="Name of the predictive controller: ltv or contact_force")
 
 
 @settings
 class MpcSettings:
     """Names follow section 2.4.5.
 
-    A softened row may be violated by its kind's ``max_..._slack``; beyond, the robot stops. With
-    the noise of a motion capture the violation of a job that goes well is zero, so the bounds say
-    what is still harmless. Wheels saturate anyway. 0.02 rad/s is what ``friction_trust`` leaves of
-    an e-puck's curvature at the speed of a push. 5 mm are more than noise and dead reckoning
+    A soft constraint may be violated by the ``max_..._slack`` of its kind; beyond that the robot
+    stops. In normal jobs with motion-capture noise the violation is zero. The bounds are what is
+    still harmless: wheels saturate anyway; 0.02 rad/s is the margin that ``friction_trust`` leaves
+    of an e-puck's curvature at the speed of a push; 5 mm are more than noise and dead reckoning
     displace a robot by, and less than the 8 mm that the supervisor adds to the circles.
     """
 
-    step: float = bounded(0.1, low=0.01, high=1.0, doc="[s] T_s of the prediction")
-    horizon: int = bounded(20, low=2, high=100, doc="p, steps predicted")
-    state_weight: tuple[float, float, float, float, float] = (40.0, 60.0, 1.0, 0.5, 0.02)
-    terminal_factor: float = bounded(5.0, low=0.0, high=1000.0, doc="P = factor * Q")
-    input_weight: tuple[float, float] = (0.05, 0.002)
-    input_rate_weight: tuple[float, float] = (0.05, 0.002)
-    max_acceleration: float = bounded(0.3, low=0.01, high=20.0, doc="[m/s^2]")
-    max_turn_acceleration: float = bounded(6.0, low=0.01, high=200.0, doc="[rad/s^2]")
-    max_acceleration_change: float = bounded(0.3, low=0.001, high=50.0, doc="[m/s^2] per step")
-    max_turn_acceleration_change: float = bounded(
-        6.0, low=0.001, high=500.0, doc="[rad/s^2] per step"
+    step: float = bounded(0.1, low=0.01, high=1.0, doc="Length T_s of a predicted step (s)")
+    horizon: int = bounded(20, low=2, high=100, doc="Number p of predicted steps")
+    state_weight: tuple[float, float, float, float, float] = bounded(
+        (40.0, 60.0, 1.0, 0.5, 0.02),
+        doc="Diagonal of Q: weights of e_x, e_y, e_theta, e_v, e_omega",
     )
-    max_obstacles: int = bounded(20, low=0, high=200, doc="nearest obstacles in the QP")
-    slack_linear: float = bounded(1000.0, low=0.0, high=1e6, doc="price of a softened row")
-    slack_quadratic: float = bounded(20000.0, low=1e-3, high=1e8, doc="price of a softened row")
+    terminal_factor: float = bounded(
+        5.0, low=0.0, high=1000.0, doc="Factor of the terminal weight, P = factor * Q"
+    )
+    input_weight: tuple[float, float] = bounded(
+        (0.05, 0.002), doc="Diagonal of R_u: weights of the two accelerations"
+    )
+    input_rate_weight: tuple[float, float] = bounded(
+        (0.05, 0.002), doc="Diagonal of R_du: weights of the changes of the two accelerations"
+    )
+    max_acceleration: float = bounded(
+        0.3, low=0.01, high=20.0, doc="Limit of the linear acceleration (m/s^2)"
+    )
+    max_turn_acceleration: float = bounded(
+        6.0, low=0.01, high=200.0, doc="Limit of the angular acceleration (rad/s^2)"
+    )
+    max_acceleration_change: float = bounded(
+        0.3, low=0.001, high=50.0, doc="Change of the linear acceleration per step (m/s^2)"
+    )
+    max_turn_acceleration_change: float = bounded(
+        6.0, low=0.001, high=500.0, doc="Change of the angular acceleration per step (rad/s^2)"
+    )
+    max_obstacles: int = bounded(20, low=0, high=200, doc="Number of nearest obstacles in the QP")
+    slack_linear: float = bounded(
+        1000.0, low=0.0, high=1e6, doc="Linear penalty of violating a soft constraint"
+    )
+    slack_quadratic: float = bounded(
+        20000.0, low=1e-3, high=1e8, doc="Quadratic penalty of violating a soft constraint"
+    )
     max_wheel_slack: float = bounded(
         0.01,
         low=1e-6,
         high=100.0,
-        doc="[m/s] of a wheel beyond its limit that is tolerated",
+        doc="Speed by which a wheel may exceed its limit before the solve counts as failed (m/s)",
     )
     max_curvature_slack: float = bounded(
-        0.02, low=1e-6, high=100.0, doc="[rad/s] beyond the stable curvature that is tolerated"
+        0.02,
+        low=1e-6,
+        high=100.0,
+        doc="Turn rate beyond the stable curvature above which the solve counts as failed (rad/s)",
     )
     max_obstacle_slack: float = bounded(
-        0.005, low=1e-6, high=100.0, doc="[m] inside an obstacle's circle that is tolerated"
+        0.005,
+        low=1e-6,
+        high=100.0,
+        doc="Depth inside an obstacle's circle above which the solve counts as failed (m)",
     )
-    backend: Literal["active_set", "daqp", "osqp"] = "active_set"
+    backend: Literal["active_set", "daqp", "osqp"] = bounded(
+        "active_set", doc="Solver of the quadratic programme"
+    )
 
     def __post_init__(self) -> None:
         if min(self.state_weight) < 0.0 or min(self.input_rate_weight) < 0.0:
@@ -61,10 +88,12 @@ class MpcSettings:
 
 @settings
 class ContactForceSettings(MpcSettings):
-    """Of the controller with contact forces, sections 2.4.5-2.4.6."""
+    """Settings of the controller with contact forces, sections 2.4.5-2.4.6."""
 
-    force_weight: float = bounded(0.001, low=1e-6, high=1e3, doc="R_u of each contact force")
-    constraint: bool = bounded(True, doc="whether (2.53) is asked for; without it for comparison")
+    force_weight: float = bounded(0.001, low=1e-6, high=1e3, doc="Weight R_u of each contact force")
+    constraint: bool = bounded(
+        True, doc="Whether the pushing constraint (2.53) is active; false for comparison only"
+    )
 
 
 @settings
@@ -72,43 +101,103 @@ class TrackerSettings:
     """When a trajectory is done, and when it has gone wrong."""
 
     tracked: Literal["object", "robot"] = bounded(
-        "object", doc="what a push steers; the thesis steers the robot and hopes for the object"
+        "object", doc="Whether a push steers the object, or the robot as in the thesis"
     )
     friction_trust: float = bounded(
-        0.85, low=0.1, high=1.0, doc="fraction of the stable curvature the controller may use"
+        0.85, low=0.1, high=1.0, doc="Fraction of the stable curvature that the controller may use"
     )
-    pose_delay: float = bounded(0.0, low=0.0, high=1.0, doc="[s] latency of the pose stream")
+    pose_delay: float = bounded(
+        0.0, low=0.0, high=1.0, doc="Latency of the pose stream that is compensated (s)"
+    )
     give_up: float = bounded(
-        5.0, low=0.1, high=600.0, doc="[s] without poses until a task is given up"
+        5.0, low=0.1, high=600.0, doc="Time without poses after which a task fails (s)"
     )
-    position_tolerance: float = bounded(0.006, low=1e-4, high=1.0, doc="[m] at the end")
-    orientation_tolerance: float = bounded(0.03, low=1e-4, high=3.2, doc="[rad] at the end")
-    settle_time: float = bounded(3.0, low=0.0, high=60.0, doc="[s] to reach the tolerance")
-    grasp_filter: float = bounded(0.2, low=0.0, high=10.0, doc="[s] time constant, object in robot")
-    rest_speed: float = bounded(0.01, low=1e-4, high=1.0, doc="[m/s] that counts as at rest")
-    rest_turn_rate: float = bounded(0.1, low=1e-3, high=10.0, doc="[rad/s] that counts as at rest")
-    lag_begin: float = bounded(0.02, low=1e-3, high=1.0, doc="[m] lag that slows the reference")
-    lag_end: float = bounded(0.06, low=2e-3, high=1.0, doc="[m] lag that halts the reference")
-    contact_gap: float = bounded(0.015, low=1e-3, high=1.0, doc="[m] object to bumper")
+    position_tolerance: float = bounded(
+        0.006, low=1e-4, high=1.0, doc="Position error allowed at the end of a trajectory (m)"
+    )
+    orientation_tolerance: float = bounded(
+        0.03, low=1e-4, high=3.2, doc="Heading error allowed at the end of a trajectory (rad)"
+    )
+    settle_time: float = bounded(
+        3.0,
+        low=0.0,
+        high=60.0,
+        doc="Time after the end of a trajectory to reach the tolerances (s)",
+    )
+    grasp_filter: float = bounded(
+        0.2,
+        low=0.0,
+        high=10.0,
+        doc="Time constant of the filter on the object's pose in the robot frame (s)",
+    )
+    rest_speed: float = bounded(
+        0.01, low=1e-4, high=1.0, doc="Speed below which a robot counts as at rest (m/s)"
+    )
+    rest_turn_rate: float = bounded(
+        0.1, low=1e-3, high=10.0, doc="Turn rate below which a robot counts as at rest (rad/s)"
+    )
+    lag_begin: float = bounded(
+        0.02, low=1e-3, high=1.0, doc="Lag of the robot at which the reference slows down (m)"
+    )
+    lag_end: float = bounded(
+        0.06, low=2e-3, high=1.0, doc="Lag of the robot at which the reference stops (m)"
+    )
+    contact_gap: float = bounded(
+        0.015, low=1e-3, high=1.0, doc="Gap to the bumper above which contact is in doubt (m)"
+    )
     contact_aside: float = bounded(
-        0.045, low=1e-3, high=1.0, doc="[m] object along the bumper, from its place"
+        0.045,
+        low=1e-3,
+        high=1.0,
+        doc="Displacement along the bumper above which contact is in doubt (m)",
     )
-    contact_turn: float = bounded(0.25, low=0.01, high=3.2, doc="[rad] object against bumper")
-    contact_time: float = bounded(0.5, low=0.0, high=10.0, doc="[s] until contact counts as lost")
-    off_course: float = bounded(0.08, low=1e-3, high=5.0, doc="[m] from the reference")
+    contact_turn: float = bounded(
+        0.25,
+        low=0.01,
+        high=3.2,
+        doc="Rotation relative to the bumper above which contact is in doubt (rad)",
+    )
+    contact_time: float = bounded(
+        0.5, low=0.0, high=10.0, doc="Time in doubt after which contact counts as lost (s)"
+    )
+    off_course: float = bounded(
+        0.08, low=1e-3, high=5.0, doc="Distance from the reference at which a task fails (m)"
+    )
     deadline: float = bounded(
-        0.0, low=0.0, high=10.0, doc="[s] wall time a solve may take in live use; 0: not watched"
+        0.0,
+        low=0.0,
+        high=10.0,
+        doc="Wall time that a solve may take in real time (s); 0 disables the check",
     )
     solver_patience: int = bounded(
-        10, low=1, high=10000, doc="failed or late solves in a row that end the task"
+        10,
+        low=1,
+        high=10000,
+        doc="Number of failed or late solves in a row after which a task fails",
     )
     fade_time: float = bounded(
-        0.1, low=1e-3, high=10.0, doc="[s] in which the command fades to zero while solves are late"
+        0.1,
+        low=1e-3,
+        high=10.0,
+        doc="Time in which the last command fades to zero while solves are late (s)",
     )
-    stuck_time: float = bounded(1.5, low=0.1, high=60.0, doc="[s] commanded but not moving")
-    stuck_way: float = bounded(0.03, low=1e-3, high=1.0, doc="[m] commanded in that time")
+    stuck_time: float = bounded(
+        1.5,
+        low=0.1,
+        high=60.0,
+        doc="Time of commanded motion over which it is judged whether a robot is stuck (s)",
+    )
+    stuck_way: float = bounded(
+        0.03,
+        low=1e-3,
+        high=1.0,
+        doc="Distance commanded within stuck_time above which it is judged (m)",
+    )
     blocked_time: float = bounded(
-        4.0, low=0.1, high=600.0, doc="[s] that the reference waits for a robot that lags behind"
+        4.0,
+        low=0.1,
+        high=600.0,
+        doc="Time that the reference waits for a robot that lags behind before a task fails (s)",
     )
 
     def __post_init__(self) -> None:

@@ -1,4 +1,4 @@
-"""What a tracker is given, and what it answers each tick."""
+"""Input of a tracker, and its output in each tick."""
 
 from dataclasses import dataclass
 from enum import IntEnum
@@ -25,10 +25,10 @@ class TrackError(IntEnum):
 
 @dataclass(frozen=True)
 class Push:
-    """What a push needs beside its trajectory.
+    """Data of a push in addition to its trajectory.
 
     grasp: ``(3,)`` nominal pose of the object in the robot frame; limits: stable curvatures for it;
-    line: where the bumper touches it; None where that is not known, or on no line.
+    line: where the bumper touches it; None if unknown or not a line.
     """
 
     grasp: Array

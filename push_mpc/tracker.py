@@ -1,11 +1,11 @@
 """Follow a trajectory: reference, controller, end and failure conditions. No ROS, no clock.
 
-In a push the object is what counts. The reference for the robot is the trajectory moved by the
-difference between the nominal and the measured place of the object in the robot frame, so that the
-error is zero when the object, not the robot, is on its way.
+In a push the object is tracked. The reference of the robot is the trajectory, shifted by the
+deviation of the object from its nominal place in the robot frame. The error is then zero if the
+object, not the robot, is on its path.
 
-Poses are late. The object's place in the robot frame is taken from poses of one time, that of the
-frame; robot and object are then carried forward to now together, along the commands since.
+Poses are late. The object's pose in the robot frame is taken from poses of the same time, that of
+the frame. Robot and object are then both predicted to the present with the commands since.
 """
 
 import math
@@ -27,8 +27,8 @@ from push_mpc.settings import TrackerSettings
 from push_mpc.task import Push, Task, Tick, TrackError
 
 _NO_CIRCLES = np.zeros((0, 3))
-_REACH = 1.5  # of the way that the horizon covers at full speed: nothing farther can bind
-_MOVING = 1e-3  # [m/s]: slower than that, omega / v is no curvature but noise
+_REACH = 1.5  # times the distance of the horizon at full speed: farther obstacles cannot matter
+_MOVING = 1e-3  # [m/s]: below it, omega / v is noise, not curvature
 
 
 class TrajectoryTracker:
@@ -39,7 +39,7 @@ class TrajectoryTracker:
         self.controller = controller
         self._command = Command(settings, controller.drive)
         self._reckoning = DeadReckoning(settings.pose_delay)
-        self._in_force = (0.0, 0.0)  # the answer to the frame before
+        self._in_force = (0.0, 0.0)  # the answer to the previous frame
         self._task: Task | None = None
 
     @property
@@ -59,16 +59,27 @@ class TrajectoryTracker:
 
     @property
     def solves(self) -> int:
-        """How often the controller was asked."""
+        """Number of solves."""
         return self._command.solves
 
     @property
     def failures(self) -> int:
-        """How often its answer could not be used."""
+        """Number of solves that could not be used."""
         return self._command.failures
 
+    @property
+    def push(self) -> Push | None:
+        """What the task pushes, if it does."""
+        return None if self._task is None else self._task.push
+
+    def believe(self, push: Push | None, delay: float) -> None:
+        """Go on with another belief: of the push under way, and of the latency [s] of the poses."""
+        if self._task is not None and push is not None:
+            self._task = replace(self._task, push=push)
+        self._reckoning.delay = delay
+
     def warm_up(self) -> None:
-        """So that the first command does not wait."""
+        """Compile and solve once, so that the first command does not wait."""
         self.controller.warm_up()
 
     def start(self, task: Task) -> None:
@@ -82,7 +93,7 @@ class TrajectoryTracker:
         )
         self._end = EndCheck(self.settings, task)
         self._failure = FailureCheck(self.settings, self.controller.drive.half_track)
-        self._lag = 0.0  # [m] behind the reference, at the tick before
+        self._lag = 0.0  # [m] behind the reference in the previous tick
         self._command.start()
         self.controller.reset()
 
@@ -92,14 +103,14 @@ class TrajectoryTracker:
         self._command.stop()
 
     def rest(self, dt: float) -> None:
-        """A frame, dt [s] after the one before, that is answered with zero; the task is kept."""
+        """Answer a frame, dt [s] after the previous one, with zero; the task is kept."""
         self._reckoning.record(dt, *self._in_force)
         self._reckoning.forget(0.0)
         self._command.stop()
         self._in_force = (0.0, 0.0)
 
     def halt(self) -> None:
-        """Command zero after an interruption in which the robot came to rest; keep the task."""
+        """Command zero after an interruption that stopped the robot; keep the task."""
         self._reckoning.clear()
         self._command.stop()
         self._in_force = (0.0, 0.0)
@@ -190,7 +201,7 @@ class TrajectoryTracker:
         )
 
     def _contact(self, push: Push, grasp: GraspEstimate) -> Contact:
-        """The object where it is, its friction only trusted in part."""
+        """The contact at the object's actual place, with the trusted part of its friction."""
         trust = self.settings.friction_trust
         limits = shifted_limits(push.limits.scaled(trust), grasp.offset)
         if push.line is None:
@@ -204,7 +215,7 @@ class TrajectoryTracker:
         contact: Contact | None,
         circles: Array,
     ) -> MpcResult:
-        """Solve; an answer after the deadline is as bad as none."""
+        """Solve; an answer after the deadline does not count."""
         started = time.perf_counter()
         solve = self.controller.solve(error, reference, contact, circles)
         late = time.perf_counter() - started
@@ -221,7 +232,7 @@ class TrajectoryTracker:
         )
 
     def _final_errors(self, task: Task, robot: Array, item: Array | None) -> tuple[float, float]:
-        """Distance [m] and angle [rad] of what counts to where it shall end."""
+        """Distance [m] and angle [rad] of the tracked body to its end pose."""
         end = task.trajectory.pose[-1].copy()
         end[2] = se2.wrap(end[2])
         place = robot
@@ -230,13 +241,13 @@ class TrajectoryTracker:
         return distance(end, place)
 
     def _room(self, task: Task, robot: Array) -> Array:
-        """``(m,)`` [m] of the robot to each obstacle's boundary."""
+        """``(m,)`` [m] distances of the robot to the obstacles' boundaries."""
         c = task.circles
         room: Array = np.hypot(c[:, 0] - robot[0], c[:, 1] - robot[1]) - c[:, 2]
         return room
 
     def _nearest(self, task: Task, room: Array) -> Array:
-        """The obstacles ``(n, 3)`` within reach, no more than the controller takes."""
+        """The obstacles ``(n, 3)`` within reach, at most as many as the controller takes."""
         controller = self.controller
         count = controller.max_obstacles
         reach = _REACH * controller.drive.max_speed * controller.step * controller.horizon

@@ -33,6 +33,7 @@ from push_planner import (
     with_bodies,
 )
 from push_ros.actions import GoalServer
+from push_ros.belief_feed import BeliefFeed
 from push_ros.conversions import (
     circles_from_ros,
     path_to_ros,
@@ -88,6 +89,9 @@ class PlannerNode(Node):
         self._plan_publisher = self.create_publisher(PlanMessage, names.team("push_plan"), LATCHED)
         self._path_publisher = self.create_publisher(Path, names.team("push_path"), LATCHED)
         MapFeed(self, names, self._diagnostics, self._take_map)
+        self._beliefs = BeliefFeed(
+            self, names, self._scenario, self._diagnostics, lambda belief: self._plan_anew()
+        )
         self._server = GoalServer(
             self,
             PlanPush,
@@ -118,8 +122,12 @@ class PlannerNode(Node):
         self._planners.clear()
 
     def _take_map(self, grid: Grid) -> None:
-        """A plan under way on another map is dropped and begun anew."""
+        """Another map than before."""
         self._grid, self._field = grid, None
+        self._plan_anew()
+
+    def _plan_anew(self) -> None:
+        """The map or the belief is another one: a plan under way is dropped and begun anew."""
         self._planners.clear()
         if self._pending or self._work is not None:
             self._begin(self._request)
@@ -138,8 +146,9 @@ class PlannerNode(Node):
     def _planner(self, robot: str, item: str) -> PushPlanner:
         """Raises SettingsError for names that are not known, PlanningFailed for a robot that is not
         made for pushing."""
-        robot, robot_spec = self._scenario.robot(robot)
-        item, item_spec = self._scenario.object(item)
+        robot, item = self._scenario.robot(robot)[0], self._scenario.object(item)[0]
+        belief = self._beliefs.current
+        robot_spec, item_spec = belief.robot(robot), belief.object(item)
         key = (robot, item)
         if key not in self._planners:
             try:

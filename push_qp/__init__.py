@@ -1,4 +1,4 @@
-"""Quadratic programmes of predictive controllers, and one interface for every solver of them."""
+"""Quadratic programmes of predictive controllers, and one interface for all their solvers."""
 
 from push_qp.active_set import ActiveSetBackend
 from push_qp.backends import BACKENDS, backend

@@ -10,10 +10,10 @@ from push_qp.programme import Index, Qp, QpSolution
 
 
 def iteration_limit(qp: Qp) -> int:
-    """Iterations until a solve is given up: ten an unknown, and one a row.
+    """Limit of the iterations of a solve: ten per unknown and one per row.
 
-    Usual are one to two an active row, and there are no more of these than unknowns; a start from
-    a working set that has nothing to do with the programme may take two or three times as many.
+    One to two iterations per active row are normal, and there are no more active rows than
+    unknowns. A start from an unrelated working set may take two or three times as many.
     """
     return 10 * len(qp.f) + int(qp.bound.size)
 
@@ -31,7 +31,7 @@ class ActiveSetBackend:
     def solve(self, qp: Qp) -> QpSolution:
         """See QpBackend."""
         n = len(qp.f)
-        if self._shape != (n, *qp.bound.shape):  # what was remembered is of other rows
+        if self._shape != (n, *qp.bound.shape):  # the remembered working set belongs to other rows
             self._shape, self._count = (n, *qp.bound.shape), 0
             self._active, self._multiplier = np.zeros(n, np.int64), np.zeros(n)
         z = np.empty(n)

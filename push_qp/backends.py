@@ -1,4 +1,4 @@
-"""The solvers by name: a file each, and a line here."""
+"""The solvers by name: one file each, and a line here."""
 
 from collections.abc import Callable
 
@@ -19,7 +19,7 @@ def backend(name: str) -> QpBackend:
 
     Raises
     ------
-    ValueError: there is none.
+    ValueError: no such solver.
     """
     if name not in BACKENDS:
         known = ", ".join(f"'{other}'" for other in BACKENDS)

@@ -11,7 +11,7 @@ _ACTIVE, _AT_LOWER, _EQUALITY = 1, 2, 5  # its flags of a constraint
 
 
 class Daqp:
-    """Starts from the working set that the multipliers tell."""
+    """Starts from the working set that the multipliers indicate."""
 
     tolerance = 1e-6  # its own default
 
@@ -32,7 +32,7 @@ class Daqp:
 
 
 class DaqpBackend(RowGeneration):
-    """DAQP with rows as they are needed, or with every row."""
+    """DAQP with row generation, or with every row."""
 
     def __init__(self, every_row: bool = False) -> None:
         super().__init__(Daqp(), every_row)

@@ -1,4 +1,4 @@
-"""Factors of the Hessian and of the working set, kept up to date as rows come and go.
+"""Factors of the Hessian and of the working set, updated as rows enter and leave.
 
 With H = L L', the rows of JT = Q' L^-1 are turned by an orthogonal Q such that the normals N of the
 q rows of the working set satisfy JT N = (R; 0), R upper triangular.

@@ -1,11 +1,11 @@
 """Dual active-set method for strictly convex quadratic programmes (Goldfarb and Idnani, 1983).
 
-Compiled, and shaped for a condensed MPC: a row is a combination of the outputs of one step, so all
-rows are checked through the outputs, and only those that enter the working set are ever written
-out. Equalities come first and are never dropped. Starts from the working set of the previous tick;
-beyond it, the constraint to add is the one that is violated most as measured in the metric of H on
-the subspace that is still free (the dual steepest edge), which takes about as many iterations as
-there are active rows in the end.
+Compiled, and specialised for a condensed MPC. A row is a combination of the outputs of one step, so
+all rows are checked through the outputs, and only rows that enter the working set are written out.
+Equalities come first and are never dropped. A solve starts from the working set of the previous
+tick. After that the dual steepest edge rule chooses the constraint to add: the one with the largest
+violation in the metric of H on the free subspace. That takes about as many iterations as there are
+active rows at the optimum.
 
     D. Goldfarb and A. Idnani, A numerically stable dual method for solving strictly convex
     quadratic programs, Mathematical Programming 27, 1-33, 1983.
@@ -51,7 +51,7 @@ def _rooms_of(
     slack: Any,
     room: Any,
 ) -> None:
-    """What each row has left at z; with g and bound zero: how z, a direction, changes that."""
+    """Room of each row at z; with g and bound zero, the change of the room along z."""
     outputs(S, g, width, z, y)
     for j in range(family.shape[0]):
         slack[j] = z[S.shape[2] + family[j]] if family[j] >= 0 else 0.0
@@ -82,7 +82,7 @@ def _select(
 ) -> int:
     """Number of the inequality with the greatest violation^2 / weight.
 
-    -1: none is violated; -2: one of them cannot be told.
+    -1: none is violated; -2: a value is not finite.
     """
     n, per_step = z.shape[0], room.shape[1]
     chosen, best = -1, 0.0
@@ -138,7 +138,7 @@ def _add_equalities(
 ) -> tuple[int, int]:
     """Onto the equalities, one after the other; returns status and how many there are.
 
-    One that depends on those before it is passed over when it agrees with them.
+    One that depends on earlier ones is skipped if it is consistent with them.
     """
     n, q = z.shape[0], 0
     for k in range(bound.shape[0]):
@@ -247,10 +247,10 @@ def solve(
         )
         if status != OPTIMAL:
             return status, iterations, q
-    equalities = q  # the first of the working set; they stay
-    weighed = False  # weights are kept from the first constraint on that was not guessed
-    exact = False  # whether room is what z leaves, not the sum of its changes
-    stale = True  # whether room knows nothing of z
+    equalities = q  # first in the working set, never dropped
+    weighed = False  # weights are updated from the first constraint on that was not guessed
+    exact = False  # whether room is computed from z, not updated incrementally
+    stale = True  # whether room is outdated
     while True:
         # 1. a violated constraint: first those guessed, then the steepest
         chosen = -1
@@ -280,7 +280,7 @@ def solve(
                     _rooms_of(JT[i], S, zero_g, width, normal, zero_bound, family, y, slack, change)
                     _weigh(1.0, JT[i], change, box_weight, row_weight)
                 floor = 1e-10 * box_weight.max()
-                if floor == 0.0:  # the guess filled the space: no direction is left to weigh
+                if floor == 0.0:  # the guess filled the space: no free direction is left
                     for c in range(n):
                         floor = max(floor, 1e-10 * dot(JT[:, c], JT[:, c]))
                 weighed, chosen = True, -1

@@ -12,7 +12,7 @@ from push_qp.row_generation import DenseSolution, RowGeneration
 class Osqp:
     """``tolerance`` is OSQP's eps_abs and eps_rel. Starts from the point and the multipliers.
 
-    Set up anew each time: a solver that met a NaN stays poisoned.
+    It is set up anew each time, because a solver that met a NaN never recovers.
     """
 
     def __init__(self, tolerance: float, polish: bool) -> None:
@@ -52,7 +52,7 @@ class Osqp:
 
 
 class OsqpBackend(RowGeneration):
-    """OSQP with rows as they are needed, or with every row."""
+    """OSQP with row generation, or with every row."""
 
     def __init__(
         self, tolerance: float = 1e-5, polish: bool = True, every_row: bool = False

@@ -48,7 +48,7 @@ class Qp:
             raise ValueError("an equality cannot be softened: its family must be -1")
 
     def rooms(self, z: Array) -> Array:
-        """What each row has left ``(K r,)``; negative: violated, as an equality not zero is."""
+        """Room of each row ``(K r,)``; negative where violated (for equalities: nonzero)."""
         y, room = np.empty(self.g.shape), np.empty(self.bound.shape)
         kernels.outputs(self.S, self.g, self.width, z, y)
         slack = np.append(z[self.S.shape[2] :], 0.0)[self.family]
@@ -71,7 +71,7 @@ class Qp:
         return G, b
 
     def all_rows(self) -> Index:
-        """Numbers of the rows that there are."""
+        """Numbers of the rows that are switched on."""
         return np.flatnonzero(~np.isposinf(self.bound))
 
     def equalities(self, numbers: Index) -> Flags:
@@ -106,7 +106,7 @@ class Qp:
 
 @dataclass(frozen=True)
 class QpSolution:
-    """z ``(n,)``; solved: the solver says so and z is finite; status: its own word."""
+    """z ``(n,)``; solved: the solver succeeded and z is finite; status: the solver's own."""
 
     z: Array
     solved: bool
@@ -114,12 +114,12 @@ class QpSolution:
 
 
 class QpBackend(Protocol):
-    """A solver. May remember the last solution; ``reset`` forgets it."""
+    """A solver. It may remember the last solution; ``reset`` forgets it."""
 
     def solve(self, qp: Qp) -> QpSolution:
         """Solve it."""
         ...
 
     def reset(self) -> None:
-        """Forget what was remembered."""
+        """Forget the last solution."""
         ...

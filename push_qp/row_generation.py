@@ -1,8 +1,8 @@
-"""Rows as they are needed, around a solver of programmes with plain rows.
+"""Row generation around a solver of programmes with plain rows.
 
-From the rows near the last solution on, those that are violated are added and the programme is
-solved again, until none is. Rows are checked and written out by compiled code; the solver starts
-each time from the multipliers that it found before, those of the previous tick included.
+The first programme has the rows near the last solution. Violated rows are added and the programme
+is solved again until no row is violated. Compiled code checks and writes out the rows. Each solve
+starts from the previous multipliers, also those of the previous tick.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ _NEAR = 0.005  # room of a row that is kept for the next solve, in its own unit
 class DenseSolution:
     """z ``(n,)`` and multipliers ``(n + m,)``: of the bounds, then of the rows, > 0 at the upper.
 
-    solved: the solver says so; status: its own word.
+    solved: the solver succeeded; status: the solver's own.
     """
 
     z: Array
@@ -34,7 +34,7 @@ class DenseSolver(Protocol):
     """A solver that is given every row written out."""
 
     tolerance: float
-    """By which its solution may violate a row, in the row's own unit."""
+    """Violation of a row that a solution may have, in the row's own unit."""
 
     def solve(
         self,
@@ -93,7 +93,7 @@ class RowGeneration:
         kernels.write_rows(*shape, numbers, self._G, self._b)
         z, known = self._z, self._known
         box, row = (self._box, self._row) if known else (np.zeros(n), np.zeros(len(self._row)))
-        while True:  # ends: each round adds rows, and there are only so many
+        while True:  # terminates: each round adds rows, and their number is finite
             index = self._numbers[:count]
             G, b = self._G[:count], self._b[:count]
             if not (np.isfinite(G).all() and np.isfinite(b).all()):

@@ -74,10 +74,10 @@ def violated(
     room: Any,
     numbers: Any,
 ) -> int:
-    """How many rows beyond those ``chosen`` ``(K r,)`` are violated at z; -1: it cannot be told.
+    """Number of rows beyond those ``chosen`` ``(K r,)`` that are violated at z; -1: not finite.
 
-    Their numbers are written into ``numbers`` ``(K r,)`` and they are marked in ``chosen``;
-    room ``(K, r)`` is filled in.
+    Their numbers are written into ``numbers`` ``(K r,)``, and they are marked in ``chosen``. room
+    ``(K, r)`` is filled in.
     """
     y, slack = np.empty(g.shape), np.empty(bound.shape[1])
     outputs(S, g, width, z, y)

@@ -33,7 +33,7 @@ class BagWriter:
     """Writes one bag. ``metadata`` (scenario, seed, revision) goes inside the file."""
 
     def __init__(self, folder: Path, metadata: Mapping[str, str]) -> None:
-        """Raises FileExistsError when the folder is there already."""
+        """Raises FileExistsError if the folder exists already."""
         folder.mkdir(parents=True)
         self.folder = folder
         self._file = (folder / f"{folder.name}_0.mcap").open("wb")
@@ -81,7 +81,7 @@ class BagWriter:
         self._write_metadata()
 
     def abandon(self) -> None:
-        """Stop writing where nothing more can be written; whole chunks stay readable."""
+        """Stop writing when nothing more can be written; complete chunks stay readable."""
         self.closed = True
         with contextlib.suppress(OSError):
             self._file.close()
@@ -168,7 +168,7 @@ def read_metadata(bag: Path) -> dict[str, str]:
 
 
 def _records(bag: Path) -> Iterator[Any]:
-    """All records, up to where a cut-off file ends."""
+    """All records, up to the end of a truncated file."""
     with bag_file(bag).open("rb") as file:
         try:
             yield from StreamReader(file).records
@@ -178,7 +178,7 @@ def _records(bag: Path) -> Iterator[Any]:
 
 @dataclass(frozen=True)
 class RawRecord:
-    """A message of a bag as it was sent: topic, type, log time [ns], CDR bytes."""
+    """A serialised message of a bag: topic, type, log time [ns], CDR bytes."""
 
     topic: str
     type: str
@@ -187,7 +187,7 @@ class RawRecord:
 
 
 def read_bag(bag: Path, topics: set[str] | None = None) -> Iterator[Record]:
-    """Messages in file order; a bag whose writer was killed gives what its whole chunks hold."""
+    """Messages in file order; of a truncated bag, those of its complete chunks."""
     store = typestore()
     for raw in read_raw(bag, topics):
         yield Record(raw.topic, raw.stamp, store.deserialize_cdr(raw.data, raw.type))
@@ -209,7 +209,7 @@ def read_raw(bag: Path, topics: set[str] | None = None) -> Iterator[RawRecord]:
 
 
 def recover(bag: Path, folder: Path) -> int:
-    """Copy what can be read of a cut-off bag into a finished one; returns the message count."""
+    """Copy the readable part of a truncated bag into a new one; returns the message count."""
     writer = BagWriter(folder, read_metadata(bag))
     schemas: dict[int, str] = {}
     names: dict[int, str] = {}

@@ -1,4 +1,4 @@
-"""Collisions, told from contacts that are meant."""
+"""Counting collisions, as distinct from intended contacts."""
 
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
@@ -8,10 +8,10 @@ _APART = 0.1  # [s] without contact after which a touch is a new collision
 
 @dataclass
 class Collisions:
-    """Counts collisions of a run, a touch once however long it lasts.
+    """Counts collisions of a run. A touch counts once, however long it lasts.
 
-    A robot that touches an object pushes it; that is none. Whatever is neither robot nor object is
-    a wall.
+    A robot that touches an object pushes it, which is no collision. Anything that is neither a
+    robot nor an object is a wall.
     """
 
     robots: Collection[str]
@@ -24,11 +24,11 @@ class Collisions:
 
     @property
     def with_walls(self) -> int:
-        """Of robots and of objects."""
+        """Names of robots and of objects."""
         return self.robots_with_walls + self.objects_with_walls
 
     def take(self, time: float, body_a: Iterable[str], body_b: Iterable[str]) -> None:
-        """Enter the contacts at a time [s], a pair each; times must not fall but by a reset."""
+        """Add the contacts of a time [s], as pairs; times must not decrease except by a reset."""
         for a, b in zip(body_a, body_b, strict=True):
             pair = (a, b) if a < b else (b, a)
             last = self._touched.get(pair)

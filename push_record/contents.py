@@ -1,4 +1,4 @@
-"""What a bag holds, as time series: bodies, jobs of all teams, controllers, collisions."""
+"""The contents of a bag as time series: bodies, jobs of all teams, controllers, collisions."""
 
 from collections.abc import Container
 from dataclasses import dataclass, field
@@ -7,9 +7,11 @@ from typing import Any, cast
 
 import numpy as np
 
+from push_job.report import Report
 from push_model.arrays import Array
 from push_record.bag import read_bag, read_metadata
 from push_record.collisions import Collisions
+from push_ros.report_conversions import report_from_ros
 from push_ros.validation import InvalidMessage, planar_pose
 from push_scenario.scenario import Scenario, scenario_from_text
 
@@ -25,27 +27,14 @@ STATUS = (
 )
 """Columns of a controller's status, see push_msgs/ControllerStatus."""
 
-GROUP_STATUS = (
-    "time",
-    "position_error",
-    "orientation_error",
-    "lacking",
-    "margin",
-    "solve_time",
-    "wrench_x",
-    "wrench_y",
-    "wrench_torque",
-)
-"""Columns of a group's status, see push_msgs/GroupStatus."""
-
 _SPACING = 0.02  # [s] least, between frames that are kept
-_MOMENTS = 2.0  # [s] between messages of a swarm that are kept whole
+_MOMENTS = 2.0  # [s] between reports that are kept whole
 _MOVING = (1, 2)  # modes MOVE and PUSH of ControllerStatus
 
 
 @dataclass(frozen=True)
 class State:
-    """Of a job, at a time [s]; code: of the last job that ended."""
+    """State of a job at a time [s]; code: of the last job that ended."""
 
     time: float
     name: str
@@ -54,33 +43,35 @@ class State:
 
 
 @dataclass
-class GroupPushes:
-    """One push of a group: pushers, and rows of numbers at its ticks.
+class ReportSeries:
+    """What one method or controller reported.
 
-    rows: of GROUP_STATUS. points, normals, forces: ``(n, 2)`` each, fixed frame, by tick.
+    times [s] and phases of its reports. figures: by name, unit, times [s] and values. moments: time
+    [s] and whole report, every few seconds.
     """
 
-    pushers: tuple[str, ...]
-    friction: float
-    rows: list[list[float]] = field(default_factory=list)
-    points: list[Array] = field(default_factory=list)
-    normals: list[Array] = field(default_factory=list)
-    forces: list[Array] = field(default_factory=list)
+    method: str
+    times: list[float] = field(default_factory=list)
+    phases: list[str] = field(default_factory=list)
+    figures: dict[str, tuple[str, list[float], list[float]]] = field(default_factory=dict)
+    moments: list[tuple[float, Report]] = field(default_factory=list)
 
-
-@dataclass
-class SwarmTicks:
-    """What a swarm told: rows of time [s], position error [m], orientation error [rad], CPU [s] and
-    phase; and whole messages, push_msgs/SwarmStatus, every few seconds."""
-
-    rows: list[tuple[float, float, float, float, str]] = field(default_factory=list)
-    moments: list[Any] = field(default_factory=list)
+    def take(self, time: float, report: Report) -> None:
+        """One more report, of a time [s]."""
+        self.times.append(time)
+        self.phases.append(report.phase)
+        for figure in report.figures:
+            _, times, values = self.figures.setdefault(figure.name, (figure.unit, [], []))
+            times.append(time)
+            values.append(figure.value)
+        if not self.moments or time - self.moments[-1][0] >= _MOMENTS:
+            self.moments.append((time, report))
 
 
 @dataclass
 class Job:
     """What a team did. goal ``(3,)``: the last one; plan: ``(n, 2)`` [m] of each push's axle, or of
-    the object that a group pushes; pushes: of a group; swarm: of a swarm."""
+    the object that a group pushes; reports: by topic, of its method and its controllers."""
 
     space: str
     system: str = ""
@@ -89,13 +80,12 @@ class Job:
     states: list[State] = field(default_factory=list)
     goal: Array | None = None
     plan: list[Array] = field(default_factory=list)
-    pushes: list["GroupPushes"] = field(default_factory=list)
-    swarm: SwarmTicks = field(default_factory=SwarmTicks)
+    reports: dict[str, ReportSeries] = field(default_factory=dict)
 
 
 @dataclass
 class BagContents:
-    """time ``(n,)`` [s]; poses ``(n, 3)`` by body, ground truth, nan where it is not told.
+    """time ``(n,)`` [s]; poses ``(n, 3)`` by body, ground truth, nan where unknown.
 
     status: by robot, by column of STATUS ``(k,)``; jobs: by the team's namespace.
     """
@@ -110,7 +100,7 @@ class BagContents:
 
 
 class _Suffixes(Container[str]):
-    """Topics by how their names end, whatever the namespace."""
+    """Topics by the end of their names, in any namespace."""
 
     def __init__(self, *suffixes: str) -> None:
         self._suffixes = tuple(f"/{s}" for s in suffixes)
@@ -124,7 +114,7 @@ def _seconds(stamp: Any) -> float:
 
 
 class _Frames:
-    """Frames of poses on their way into arrays."""
+    """Collects frames of poses into arrays."""
 
     def __init__(self, names: tuple[str, ...]) -> None:
         self._index = {name: i for i, name in enumerate(names)}
@@ -174,7 +164,7 @@ def bag_scenario(bag: Path) -> tuple[Scenario, dict[str, str]]:
 
 
 def load(bag: Path) -> BagContents:
-    """Read what a report shows.
+    """Read the data of a report.
 
     Raises
     ------
@@ -185,13 +175,13 @@ def load(bag: Path) -> BagContents:
     contents = BagContents(scenario, metadata, collisions)
     frames = _Frames((*scenario.robots, *scenario.objects))
     status: dict[str, list[list[float]]] = {}
+    series: dict[str, ReportSeries] = {}
     wanted = _Suffixes(
         "ground_truth/poses",
         "job_state",
         "push_plan",
         "group_plan",
-        "group_status",
-        "swarm_status",
+        "report",
         "contacts",
         "controller/status",
     )
@@ -203,6 +193,13 @@ def load(bag: Path) -> BagContents:
             if m.mode in _MOVING:
                 row = [_seconds(m.header.stamp), *(getattr(m, k) for k in STATUS[1:])]
                 status.setdefault(str(m.robot), []).append(row)
+        elif record.topic.endswith("/report"):
+            try:
+                report = report_from_ros(m)
+            except InvalidMessage:  # what somebody recorded need not be right
+                continue
+            told = series.setdefault(record.topic, ReportSeries(str(m.method)))
+            told.take(_seconds(m.header.stamp), report)
         elif record.topic.endswith("/contacts"):
             collisions.take(_seconds(m.header.stamp), m.body_a, m.body_b)
         else:
@@ -212,13 +209,10 @@ def load(bag: Path) -> BagContents:
                 _take_state(job, m)
             elif record.topic.endswith("/group_plan"):
                 job.plan.append(np.column_stack([m.x, m.y]))
-                job.pushes.append(GroupPushes(tuple(m.pushers), 0.0))
-            elif record.topic.endswith("/group_status"):
-                _take_group_status(job, m)
-            elif record.topic.endswith("/swarm_status"):
-                _take_swarm_status(job.swarm, m)
             else:
                 job.plan = [np.column_stack([s.trajectory.x, s.trajectory.y]) for s in m.segments]
+    for topic, told in series.items():
+        _give(contents.jobs, topic, told)
     contents.time, contents.poses = frames.finish()
     for robot, rows in status.items():
         table = np.array(rows, dtype=np.float64)
@@ -226,37 +220,14 @@ def load(bag: Path) -> BagContents:
     return contents
 
 
-def _take_swarm_status(swarm: SwarmTicks, message: Any) -> None:
-    time = _seconds(message.header.stamp)
-    swarm.rows.append(
-        (
-            time,
-            float(message.position_error),
-            float(message.orientation_error),
-            float(message.solve_time),
-            str(message.phase),
-        )
-    )
-    if not swarm.moments or time - _seconds(swarm.moments[-1].header.stamp) >= _MOMENTS:
-        swarm.moments.append(message)
-
-
-def _take_group_status(job: Job, message: Any) -> None:
-    if not job.pushes or not len(message.force_x):
-        return
-    push = job.pushes[-1]
-    if push.pushers != tuple(message.pushers):
-        return
-    push.friction = float(message.friction)
-    push.rows.append(
-        [_seconds(message.header.stamp), *(getattr(message, k) for k in GROUP_STATUS[1:])]
-    )
-    for kept, x, y in (
-        (push.points, message.contact_x, message.contact_y),
-        (push.normals, message.normal_x, message.normal_y),
-        (push.forces, message.force_x, message.force_y),
-    ):
-        kept.append(np.column_stack([x, y]))
+def _give(jobs: dict[str, Job], topic: str, series: ReportSeries) -> None:
+    """To the job of the team, or of the robot, that a topic of reports belongs to."""
+    space = topic.rpartition("/")[0] + "/"
+    robot = space.rstrip("/").rpartition("/")[2]
+    for job in jobs.values():
+        if job.space == space or robot in job.robots:
+            job.reports[topic] = series
+            return
 
 
 def _take_state(job: Job, message: Any) -> None:
@@ -269,5 +240,5 @@ def _take_state(job: Job, message: Any) -> None:
     if message.goal.header.frame_id:
         try:
             job.goal = planar_pose(message.goal.pose, "the goal")
-        except InvalidMessage:  # what somebody recorded need not be right
+        except InvalidMessage:  # a recorded message need not be valid
             pass

@@ -1,4 +1,4 @@
-"""Playback: what a bag shows is published again, for the viewer, RViz and their like."""
+"""Playback: publish the contents of a bag again, for the viewer, RViz and similar tools."""
 
 import math
 import sys
@@ -18,15 +18,15 @@ from push_record.topics import Topic, shown_topics
 from push_ros.names import names_of
 from push_ros.process import run_node
 
-_PERIOD = 0.005  # [s] wall time between looks at the clock
-_LONGEST = 1e6  # [s] of a bag; a stamp beyond is of another clock
-_LISTEN = 0.7  # [s] wall time before it begins, for those who listen to be found
+_PERIOD = 0.005  # [s] wall time between checks of the clock
+_LONGEST = 1e6  # [s] length of a bag; a stamp beyond it belongs to another clock
+_LISTEN = 0.7  # [s] wall time before it begins, for subscribers to be discovered
 
 
 class PlayerNode(Node):
-    """Publishes poses, map, plans and states of a bag at the pace at which they were recorded.
+    """Publishes poses, map, plans and states of a bag at the recorded pace.
 
-    Commands, heartbeats and goals are not published: nothing moves by a playback.
+    Commands, heartbeats and goals are not published, so that a playback moves no robot.
     finished: whether all has been published.
     """
 
@@ -37,7 +37,7 @@ class PlayerNode(Node):
         namespace: str = "",
         moment: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Read what the bag is of.
+        """Read the scenario and the topics of the bag.
 
         Parameters
         ----------
@@ -86,7 +86,7 @@ class PlayerNode(Node):
         return self._next is None
 
     def _due(self, stamp: int) -> float:
-        """[s] of bag time after the first poses; what was recorded before any clock is due now."""
+        """[s] of bag time after the first poses; messages from before any clock are due at once."""
         due = 1e-9 * (stamp - self._first)
         return due if due < _LONGEST else 0.0
 

@@ -1,4 +1,4 @@
-"""The recorder node: the topics of a world and its teams into a bag."""
+"""The recorder node: records the topics of a world and its teams into a bag."""
 
 import sys
 import time
@@ -19,7 +19,7 @@ from push_ros.process import run_node
 from push_ros.qos import CLOCK
 from push_scenario.scenario import Scenario, load_scenario, scenario_from_text
 
-_PATIENCE = 5.0  # [s] wall time that the scenario has to be heard
+_PATIENCE = 5.0  # [s] wall time to receive the scenario
 
 
 def heard_scenario(namespace: str = "", limit: float | None = None) -> Scenario:
@@ -27,8 +27,8 @@ def heard_scenario(namespace: str = "", limit: float | None = None) -> Scenario:
 
     Raises
     ------
-    SettingsError: none is heard within limit [s] of wall time, a few seconds when it is not given;
-        says what to do.
+    SettingsError: none is received within limit [s] of wall time (default: a few seconds); says
+        what to do.
     """
     topic = names_in(namespace)
     message = hear_latched(String, topic, _PATIENCE if limit is None else limit)
@@ -40,12 +40,12 @@ def heard_scenario(namespace: str = "", limit: float | None = None) -> Scenario:
 
 
 def names_in(namespace: str) -> str:
-    """Full name of the topic that a world's scenario is latched on."""
+    """Full name of the latched topic with the scenario of a world."""
     return f"/{namespace.strip('/')}/scenario".replace("//", "/")
 
 
 class RecorderNode(Node):
-    """Writes raw messages as they come. Log time is sim time once a clock has been seen."""
+    """Writes raw messages as they arrive. Log time is simulated time once a clock was received."""
 
     def __init__(
         self,
@@ -54,18 +54,18 @@ class RecorderNode(Node):
         seed: int | None = None,
         namespace: str = "",
     ) -> None:
-        """Open the bag and listen.
+        """Open the bag and subscribe.
 
         Parameters
         ----------
-        folder: of the bag, which must not be there yet; parameter ``out`` when it is not given.
-        scenario: what runs; parameter ``scenario``, a name or path, when it is not given; what is
-            published on ``scenario`` when that is empty.
-        seed: of the run; the scenario's when it is not given. namespace: the world's.
+        folder: of the bag, which must not exist; default: parameter ``out``.
+        scenario: the running one; default: parameter ``scenario`` (a name or path), or the one
+            that is published on ``scenario`` if that is empty.
+        seed: of the run; default: the scenario's. namespace: the world's.
 
         Raises
         ------
-        FileExistsError: the folder is there. SettingsError: no scenario is known.
+        FileExistsError: the folder exists. SettingsError: no scenario is known.
         """
         super().__init__("recorder", namespace=namespace)
         names = names_of(self)
@@ -108,7 +108,7 @@ class RecorderNode(Node):
         simulated = self._sim_time > 0 or self.count_publishers(self._clock_topic) > 0
         try:
             self.writer.write(topic, self._sim_time if simulated else time.time_ns(), bytes(data))
-        except OSError as error:  # e.g. the disk is full: what is written stays readable
+        except OSError as error:  # e.g. the disk is full; written chunks stay readable
             self.get_logger().error(f"recording ends: {error}")
             self.writer.abandon()
 

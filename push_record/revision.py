@@ -1,11 +1,11 @@
-"""Which state of the source a bag or a study was made with."""
+"""The state of the source with which a bag or a study was made."""
 
 import subprocess
 from pathlib import Path
 
 
 def revision() -> str:
-    """The git revision of the source tree, with a mark when it was changed; empty without git."""
+    """The git revision of the source tree, marked if there are changes; empty without git."""
     here = Path(__file__).resolve().parent
     try:
         text = subprocess.run(

@@ -1,4 +1,4 @@
-"""What is recorded of a scenario, and played: topics of the world, of each robot, of each team."""
+"""Topics that are recorded and played: of the world, of each robot, of each team."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -13,26 +13,26 @@ from std_msgs.msg import Bool, Header, String
 from visualization_msgs.msg import MarkerArray
 
 from push_msgs.msg import (
+    Belief,
     Contacts,
     ControllerStatus,
     GroupPlan,
-    GroupStatus,
     JobState,
     Poses,
     PushPlan,
-    SwarmStatus,
+    Report,
     Velocities,
     WheelTorques,
 )
 from push_ros.names import Names, inside, space
-from push_ros.qos import CLOCK, COMMAND, LATCHED, STATUS, STREAM
+from push_ros.qos import BELIEF, CLOCK, COMMAND, LATCHED, STATUS, STREAM
 from push_scenario.scenario import Scenario
 from tf2_msgs.msg import TFMessage
 
 
 @dataclass(frozen=True)
 class Topic:
-    """message: class. qos: of its publisher, which a subscriber takes too."""
+    """message: class. qos: of its publisher, used by subscribers too."""
 
     message: Any
     qos: Any
@@ -40,7 +40,7 @@ class Topic:
     @property
     def latched(self) -> bool:
         """Whether a late reader gets the last message."""
-        return self.qos is LATCHED
+        return self.qos is LATCHED or self.qos is BELIEF
 
     @property
     def type_name(self) -> str:
@@ -56,6 +56,7 @@ WORLD = {
     "map": Topic(OccupancyGrid, LATCHED),
     "scenario": Topic(String, LATCHED),
     "paused": Topic(Bool, LATCHED),
+    "belief": Topic(Belief, BELIEF),
     "cmd_vels": Topic(Velocities, COMMAND),
     "tf": Topic(TFMessage, STATUS),
     "visualization": Topic(MarkerArray, STATUS),
@@ -68,8 +69,7 @@ TEAM = {
     "push_plan": Topic(PushPlan, LATCHED),
     "push_path": Topic(PathMessage, LATCHED),
     "group_plan": Topic(GroupPlan, LATCHED),
-    "group_status": Topic(GroupStatus, STATUS),
-    "swarm_status": Topic(SwarmStatus, STATUS),
+    "report": Topic(Report, STATUS),
     "job_state": Topic(JobState, LATCHED),
     "status_text": Topic(String, LATCHED),
 }
@@ -79,6 +79,7 @@ ROBOT = {
     "cmd_vel": Topic(TwistStamped, COMMAND),
     "heartbeat": Topic(Header, STREAM),
     "controller/status": Topic(ControllerStatus, STATUS),
+    "report": Topic(Report, STATUS),
 }
 """In the namespace of each robot."""
 
@@ -86,18 +87,18 @@ TORQUE_ROBOT = {
     "wheel_torques": Topic(WheelTorques, COMMAND),
     "joint_states": Topic(JointState, STREAM),
 }
-"""Further, in the namespace of each robot whose wheels are driven by torque."""
+"""Additional topics of each robot whose wheels are driven by torque."""
 
 MANY = 50
-"""Robots of a world from which on they are commanded by ``cmd_vels``, and nothing of a single one
-is recorded: some subscriptions a robot would cost too much."""
+"""Number of robots from which on they are commanded by ``cmd_vels``. Topics of single robots are
+then not recorded, because a few subscriptions per robot would cost too much."""
 
-SHOWN = ("clock", "poses", "map", "scenario", "paused", "tf", "visualization")
+SHOWN = ("clock", "poses", "map", "scenario", "paused", "belief", "tf", "visualization")
 """Of the world's: what a playback shows. Commands and ground truth are not published again."""
 
 
 def team_names(scenario: Scenario, namespace: str = "") -> dict[str, Names]:
-    """The names of each team; of the unnamed one where the scenario names none."""
+    """The names of the teams; one unnamed team if the scenario has none."""
     world = space(namespace)
     teams = list(scenario.teams) or [""]
     return {t: Names(world, space(inside(namespace, t)) if t else world) for t in teams}
@@ -126,5 +127,6 @@ def shown_topics(scenario: Scenario, namespace: str = "") -> dict[str, Topic]:
     for team in teams.values():
         topics.update({team.team(t): topic for t, topic in TEAM.items() if t != "goal_pose"})
     for robot in scenario.robots if len(scenario.robots) < MANY else ():
-        topics[names.robot(robot, "controller/status")] = ROBOT["controller/status"]
+        for own in ("controller/status", "report"):
+            topics[names.robot(robot, own)] = ROBOT[own]
     return topics

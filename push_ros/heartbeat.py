@@ -1,7 +1,5 @@
 """Signs of life: who gave a robot its task says with every frame that it is still there."""
 
-import time
-
 from rclpy.node import Node
 from std_msgs.msg import Header
 
@@ -20,16 +18,16 @@ class HeartbeatWatch:
     def __init__(
         self, node: Node, names: Names, robot: str, feed: PoseFeed, diagnostics: Diagnostics
     ) -> None:
-        self._feed, self._diagnostics = feed, diagnostics
+        self._node, self._feed, self._diagnostics = node, feed, diagnostics
         self._topic = names.robot(robot, "heartbeat")
         self._timeout = 0.0
-        self._stamp = self._wall = 0.0
+        self._stamp = self._heard = 0.0
         node.create_subscription(Header, self._topic, self._on_heartbeat, STREAM)
 
     def begin(self, timeout: float) -> None:
         """From now on a silence longer than timeout [s] is a loss; 0: nothing is watched."""
         self._timeout = timeout
-        self._stamp, self._wall = self._feed.stamp, time.monotonic()
+        self._stamp, self._heard = self._feed.stamp, self._feed.clock.now
 
     def reset(self) -> None:
         """The clock went back."""
@@ -37,12 +35,18 @@ class HeartbeatWatch:
 
     @property
     def lost(self) -> bool:
-        """Whether the sender has been silent for too long in pose time and in wall time.
+        """Whether the sender has been silent for too long.
 
-        Pose time alone runs fast in a simulation that does; wall time alone runs on in a pause.
+        Live, the silence must be too long in pose time and in wall time: a fast simulation shortens
+        the one, a pause lengthens the other. In lockstep the sender must also have left the graph:
+        nobody waits for it there, so it may lag behind by any time and still be at work.
         """
-        silence = min(self._feed.stamp - self._stamp, time.monotonic() - self._wall)
-        return 0.0 < self._timeout < silence
+        silence, clock = self._feed.stamp - self._stamp, self._feed.clock
+        if not clock.lockstep:
+            silence = min(silence, clock.now - self._heard)
+        if not 0.0 < self._timeout < silence:
+            return False
+        return not clock.lockstep or int(self._node.count_publishers(self._topic)) == 0
 
     def _on_heartbeat(self, message: Header) -> None:
         stamp = time_from_ros(message.stamp)
@@ -50,4 +54,5 @@ class HeartbeatWatch:
         if known and stamp > self._feed.stamp + _AHEAD:
             self._diagnostics.refuse(self._topic, "its stamp lies in the future")
             return
-        self._stamp, self._wall = max(self._stamp, stamp), time.monotonic()
+        self._stamp = max(self._stamp, stamp)
+        self._heard = self._feed.clock.now

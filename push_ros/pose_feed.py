@@ -1,7 +1,6 @@
 """The pose stream as a node uses it: validated, gated, watched."""
 
 import struct
-import time
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -10,7 +9,6 @@ import numpy as np
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
-from std_msgs.msg import Bool
 
 from push_estimation.pose_gate import PoseGate, PoseGateSettings, Stamp
 from push_model.arrays import Array
@@ -18,7 +16,8 @@ from push_msgs.msg import Poses
 from push_ros.conversions import poses_from_ros, time_from_ros
 from push_ros.diagnostics import Diagnostics
 from push_ros.names import Names
-from push_ros.qos import LATCHED, STREAM
+from push_ros.pace_feed import LivenessClock
+from push_ros.qos import STREAM
 from push_ros.validation import FRAME, InvalidMessage
 
 
@@ -34,7 +33,10 @@ class Frame:
 
 
 class PoseFeed:
-    """Subscribes to ``poses``; calls ``on_frame`` for each frame, refused ones included."""
+    """Subscribes to ``poses``; calls ``on_frame`` for each frame, refused ones included.
+
+    clock: measures silence, of the poses and of other nodes; see ``LivenessClock``.
+    """
 
     def __init__(
         self,
@@ -50,12 +52,12 @@ class PoseFeed:
         last one sooner are not even deserialised."""
         self.gate = PoseGate(settings, bodies)
         self.topic = names.world("poses")
-        self.paused = False
+        self.clock = LivenessClock(node, names, lambda: self.gate.stamp)
         self._node = node
         self._diagnostics = diagnostics
         self._on_frame = on_frame
         self._period = period
-        self._last_wall = time.monotonic()
+        self._last = self.clock.now
         node.create_subscription(
             Poses,
             self.topic,
@@ -64,7 +66,6 @@ class PoseFeed:
             event_callbacks=diagnostics.subscription_events(self.topic),
             raw=True,
         )
-        node.create_subscription(Bool, names.world("paused"), self._on_paused, LATCHED)
         diagnostics.watch_publishers(self.topic)
 
     @property
@@ -73,9 +74,19 @@ class PoseFeed:
         return self.gate.stamp
 
     @property
+    def paused(self) -> bool:
+        """Whether the world stands still."""
+        return self.clock.paused
+
+    @property
     def silence(self) -> float:
-        """[s] wall time without a frame; a pause of the world does not count."""
-        return 0.0 if self.paused else time.monotonic() - self._last_wall
+        """[s] Wall time without a frame.
+
+        Always 0 while the world is paused, and in lockstep, where the next frame may take any time.
+        """
+        if self.clock.paused or self.clock.lockstep:
+            return 0.0
+        return self.clock.now - self._last
 
     def pose(self, name: str) -> Array | None:
         """The last accepted pose ``(3,)``; None when there is none or it is stale."""
@@ -85,10 +96,6 @@ class PoseFeed:
         """``(k, 3)`` x, y, radius [m] of bodies that are seen, of radii [m] by name."""
         found = [[*p[:2], r] for name, r in radii.items() if (p := self.pose(name)) is not None]
         return np.array(found).reshape(-1, 3)
-
-    def _on_paused(self, message: Bool) -> None:
-        self.paused = bool(message.data)
-        self._last_wall = time.monotonic()
 
     def _on_data(self, data: bytes) -> None:
         try:
@@ -118,7 +125,7 @@ class PoseFeed:
         if verdict is Stamp.REFUSED:
             self._diagnostics.refuse(self.topic, self.gate.refusal)
         else:
-            self._last_wall = time.monotonic()
+            self._last = self.clock.now
             for text in refused:
                 self.gate.refused += 1
                 self._diagnostics.refuse(self.topic, text)

@@ -1,1 +1,1 @@
-"""Scenario and map files: what is in the world, where it starts, what shall happen. No ROS here."""
+"""Scenario and map files: bodies, start poses, goals and events. No ROS here."""

@@ -21,16 +21,23 @@ _ORIGIN = np.zeros(3)
 
 @settings
 class BodyEntry:
-    """One body with a start, or a group of them with a count and a placement.
+    """One body with a start, or a group of bodies with a count and a placement.
 
-    Further keys replace those of the type; within ``drive`` and ``bumper`` key by key, unless the
-    kind changes.
+    Further keys replace those of the type. ``drive`` and ``bumper`` are merged key by key, unless
+    their kind changes.
     """
 
-    type: Any = bounded(doc="a name in config/, a path, or the type itself")
-    start: PoseValue | None = bounded(None, doc="[x, y, theta] [m, m, rad], world frame")
-    count: int | None = bounded(None, low=1, high=10000, doc="in a group; name1, name2, ...")
-    placement: Placement | None = bounded(None, doc="of a group")
+    type: Any = bounded(doc="Name of a type in config/, a path, or the type itself")
+    start: PoseValue | None = bounded(
+        None, doc="Start pose [x, y, theta] [m, m, rad] in the world frame"
+    )
+    count: int | None = bounded(
+        None,
+        low=1,
+        high=10000,
+        doc="Number of bodies of a group; they are called name1, name2, ...",
+    )
+    placement: Placement | None = bounded(None, doc="Where the bodies of a group start")
 
     def __post_init__(self) -> None:
         if self.start is None and self.count is None and self.placement is None:
@@ -43,7 +50,7 @@ class BodyEntry:
 
 @dataclass(frozen=True)
 class Group(Generic[T]):
-    """What one entry of a file stands for: the names in it and their type."""
+    """The bodies of one entry of a file: their names and their type."""
 
     key: str
     names: tuple[str, ...]
@@ -100,7 +107,7 @@ def load_robot(name: str) -> RobotSpec:
 def placed(
     robots: list[Group[RobotSpec]], objects: list[Group[ObjectSpec]], room: Room
 ) -> dict[str, Array]:
-    """Start pose ``(3,)`` of every name. Groups find their places in the order of the file."""
+    """Start pose ``(3,)`` of every body. Groups are placed in the order of the file."""
     starts: dict[str, Array] = {}
     circles: list[tuple[float, float, float]] = []
     waiting: list[tuple[Group[Any], float]] = []

@@ -1,4 +1,4 @@
-"""What happens to a scenario's bodies while it runs, told by ``kind``."""
+"""Events that happen to the bodies of a scenario while it runs, chosen by ``kind``."""
 
 from collections.abc import Set
 from dataclasses import field
@@ -12,41 +12,43 @@ _LATEST = 1e6  # [s]
 
 @settings
 class Displace:
-    """An object or a robot is moved from where it is, at once and to rest, as far as nothing is in
-    its way: no hand pushes a body into another one."""
+    """An object or a robot is moved instantly and left at rest. It stops in front of anything that
+    is in its way."""
 
     kind: Literal["displace"] = field(default="displace", kw_only=True)
-    at: float = bounded(low=0.0, high=_LATEST, doc="[s] of simulation time")
-    body: str = bounded(doc="an object or a robot")
-    by: PoseValue = bounded(doc="dx, dy, dtheta [m, m, rad] along the world's axes")
+    at: float = bounded(low=0.0, high=_LATEST, doc="Simulation time of the event (s)")
+    body: str = bounded(doc="Name of an object or a robot")
+    by: PoseValue = bounded(
+        doc="Displacement dx, dy, dtheta [m, m, rad] along the axes of the world frame"
+    )
 
 
 @settings
 class Place:
-    """An object or a robot is put somewhere, at once and to rest, unless something is there."""
+    """An object or a robot is put somewhere instantly, at rest, unless something is there."""
 
     kind: Literal["place"] = field(default="place", kw_only=True)
-    at: float = bounded(low=0.0, high=_LATEST, doc="[s] of simulation time")
-    body: str = bounded(doc="an object or a robot")
-    pose: PoseValue = bounded(doc="x, y, theta [m, m, rad], world frame")
+    at: float = bounded(low=0.0, high=_LATEST, doc="Simulation time of the event (s)")
+    body: str = bounded(doc="Name of an object or a robot")
+    pose: PoseValue = bounded(doc="Pose x, y, theta [m, m, rad] in the world frame")
 
 
 @settings
 class Kill:
-    """A robot obeys no command any more and stands where it is."""
+    """A robot ignores all commands from now on and does not move."""
 
     kind: Literal["kill"] = field(default="kill", kw_only=True)
-    at: float = bounded(low=0.0, high=_LATEST, doc="[s] of simulation time")
-    robot: str = bounded(doc="which")
+    at: float = bounded(low=0.0, high=_LATEST, doc="Simulation time of the event (s)")
+    robot: str = bounded(doc="Name of the robot")
 
 
 @settings
 class Remove:
-    """A robot is taken out of the world; motion capture does not see it any more."""
+    """A robot is removed from the world and from motion capture."""
 
     kind: Literal["remove"] = field(default="remove", kw_only=True)
-    at: float = bounded(low=0.0, high=_LATEST, doc="[s] of simulation time")
-    robot: str = bounded(doc="which")
+    at: float = bounded(low=0.0, high=_LATEST, doc="Simulation time of the event (s)")
+    robot: str = bounded(doc="Name of the robot")
 
 
 @settings
@@ -54,16 +56,18 @@ class DropPoses:
     """Motion capture does not see some bodies for a while."""
 
     kind: Literal["drop_poses"] = field(default="drop_poses", kw_only=True)
-    at: float = bounded(low=0.0, high=_LATEST, doc="[s] of simulation time")
-    bodies: tuple[str, ...] = bounded(doc="objects and robots")
-    duration: float = bounded(low=0.0, high=_LATEST, doc="[s]")
+    at: float = bounded(low=0.0, high=_LATEST, doc="Simulation time of the event (s)")
+    bodies: tuple[str, ...] = bounded(doc="Names of objects and robots")
+    duration: float = bounded(
+        low=0.0, high=_LATEST, doc="Duration for which the bodies are not seen (s)"
+    )
 
 
 Event = Displace | Place | Kill | Remove | DropPoses
 
 
 def check_names(events: tuple[Event, ...], robots: Set[str], objects: Set[str], where: str) -> None:
-    """Raise SettingsError for an event of a body that is not there."""
+    """Raise SettingsError for an event that names an unknown body."""
     names: tuple[str, ...]
     for i, event in enumerate(events):
         if isinstance(event, Kill | Remove):

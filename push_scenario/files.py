@@ -1,4 +1,4 @@
-"""Where scenario files are found, by name or path, and how they are read."""
+"""Find scenario files by name or path, and read them."""
 
 import importlib.util
 import os
@@ -36,7 +36,7 @@ def parse_yaml(text: str, where: str) -> Any:
 
 
 def dump_yaml(values: Any) -> str:
-    """YAML text of plain values; what is in it more than once is written once and referred to."""
+    """YAML text of plain values; repeated values become references."""
     return str(yaml.dump(values, Dumper=_Dumper, sort_keys=False))
 
 
@@ -65,7 +65,7 @@ def find(kind: str, name: str) -> Path:
 def read_named(
     kind: str, value: Any, where: str, folder: Path | None
 ) -> tuple[Any, str, Path | None]:
-    """What a value names or is, where that stands, and the folder that paths in it start from.
+    """The contents that a value names or is, their source, and the folder that paths start from.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where a body of a running world can be put: nowhere where a wall or another body is."""
+"""Where a body of a running world can be put without overlapping a wall or another body."""
 
 from collections.abc import Iterable, Mapping
 
@@ -8,15 +8,15 @@ from push_scenario.room import Footprint, Room, object_footprint, robot_footprin
 from push_scenario.scenario import Scenario
 
 TOUCH = 5e-4
-"""[m] by which bodies may overlap and count as touching: those that press on each other do."""
-_STEP = 1e-3  # [m] between poses of a way that are looked at
-_TURN = 0.01  # [rad] likewise
+"""[m] overlap that counts as touching; bodies that press on each other overlap slightly."""
+_STEP = 1e-3  # [m] between poses of a path that are checked
+_TURN = 0.01  # [rad] between poses of a path that are checked
 
 
 class Footing:
-    """What the bodies of a scenario leave each other.
+    """The free space between the bodies of a scenario.
 
-    Everywhere ``poses`` are those of the bodies that are there, by name: ``(3,)``.
+    ``poses`` are always those of the bodies that are present, by name: ``(3,)``.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -25,13 +25,13 @@ class Footing:
         self._objects = {n: spec for n, (spec, _) in scenario.objects.items()}
 
     def trouble(self, name: str, pose: Array, poses: Mapping[str, Array]) -> str | None:
-        """Why a body cannot stand at a pose ``(3,)``: "in epuck1"; None when it can."""
+        """Why a body cannot be at a pose ``(3,)``, e.g. "in epuck1"; None if it can."""
         return self._trouble(self._footprint(name, pose), self._others(name, poses))
 
     def along(self, name: str, by: Array, poses: Mapping[str, Array]) -> tuple[Array, str | None]:
-        """Where a body that is shoved from where it is comes to, and what stops it.
+        """How far a displaced body gets, and what stops it.
 
-        by: ``(3,)`` [m, m, rad] along the world's axes. Whom it overlaps already it may leave.
+        by: ``(3,)`` [m, m, rad] along the world's axes. It may leave bodies that it overlaps.
         """
         start = poses[name]
         steps = max(1, int(max(abs(by[0]), abs(by[1])) / _STEP), int(abs(by[2]) / _TURN))

@@ -1,8 +1,8 @@
 """Maps in the map_server format: a YAML file and a PGM or PNG image beside it. No ROS here.
 
-Unknown is wall. What a map's thresholds say of the grey 205 does not matter: it is what map savers
-write for unknown cells, and some of them have written ``free_thresh: 0.25`` beside it, above the
-share of 0.196 that 205 stands for, which would make all that is unknown free.
+Unknown cells count as walls. The grey value 205 is always unknown, whatever the thresholds say: map
+savers write it for unknown cells, and some of them have written ``free_thresh: 0.25`` beside it.
+That is above the occupancy of 0.196 that 205 stands for, and would make unknown cells free.
 """
 
 import base64
@@ -28,19 +28,28 @@ _UNKNOWN_GREY = 205  # of map savers, in trinary maps
 
 @settings
 class MapFile:
-    """The keys of map_server, and what the walls are in simulation."""
+    """The keys of map_server, and the walls in simulation."""
 
     image: str
-    resolution: float = bounded(low=1e-3, high=0.5, doc="[m] of a cell")
+    resolution: float = bounded(low=1e-3, high=0.5, doc="Size of a cell (m)")
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    negate: int = bounded(0, low=0, high=1, doc="1: white is occupied")
-    occupied_thresh: float = bounded(0.65, low=0.0, high=1.0, doc="occupied above")
+    negate: int = bounded(
+        0, low=0, high=1, doc="1 if white pixels are occupied, 0 if black ones are"
+    )
+    occupied_thresh: float = bounded(
+        0.65, low=0.0, high=1.0, doc="Occupancy above which a cell is occupied"
+    )
     free_thresh: float = bounded(
-        0.196, low=0.0, high=1.0, doc="free below; 205, the grey of unknown cells, lies above"
+        0.196,
+        low=0.0,
+        high=1.0,
+        doc="Occupancy below which a cell is free; grey 205 is unknown in any case",
     )
     mode: Literal["trinary", "scale", "raw"] = "trinary"
-    wall_height: float = bounded(0.1, low=0.01, high=5.0, doc="[m]")
-    wall_friction: float = bounded(0.3, low=0.0, high=2.0, doc="robot or object on wall")
+    wall_height: float = bounded(0.1, low=0.01, high=5.0, doc="Height of the walls (m)")
+    wall_friction: float = bounded(
+        0.3, low=0.0, high=2.0, doc="Friction coefficient of robot or object and wall"
+    )
 
     def __post_init__(self) -> None:
         if self.free_thresh > self.occupied_thresh:
@@ -61,8 +70,8 @@ def is_map(values: Any) -> bool:
 def load_map(values: Any, where: str, folder: Path | None = None) -> MapSpec:
     """The map of parsed YAML.
 
-    Unknown cells count as occupied, and so do the outermost ones: nothing leaves a map. Transparent
-    pixels are unknown, and in trinary maps the grey 205, whatever ``free_thresh`` says.
+    Unknown cells and the outermost cells count as occupied, so that nothing leaves a map.
+    Transparent pixels are unknown, and so is the grey 205 in trinary maps.
 
     Parameters
     ----------
@@ -99,7 +108,7 @@ def load_map(values: Any, where: str, folder: Path | None = None) -> MapSpec:
 
 
 def map_to_mapping(spec: MapSpec) -> dict[str, Any]:
-    """The map as YAML values of its own, the image inside."""
+    """The map as YAML values that include the image."""
     pixels = np.where(spec.grid.occupied[::-1], 0, 254).astype(np.uint8)
     data = BytesIO()
     Image.fromarray(pixels).save(data, "png")

@@ -1,4 +1,4 @@
-"""Where the bodies of a group start, told by ``kind``: on a grid, on a ring, at random."""
+"""Where the bodies of a group start, chosen by ``kind``: on a grid, on a ring, at random."""
 
 import math
 from dataclasses import field
@@ -17,13 +17,15 @@ _TRIES = 2000
 
 @settings
 class GridPlacement:
-    """Row after row, upward from the lowest."""
+    """In rows, from the lowest upward."""
 
     kind: Literal["grid"] = field(default="grid", kw_only=True)
-    corner: tuple[float, float] = bounded(low=-1e4, high=1e4, doc="[m] of the first body")
-    spacing: float = bounded(low=1e-3, high=100.0, doc="[m] between neighbours")
-    columns: int | None = bounded(None, low=1, high=10000, doc="in a row; by default a square")
-    heading: float = bounded(0.0, low=-10.0, high=10.0, doc="[rad]")
+    corner: tuple[float, float] = bounded(low=-1e4, high=1e4, doc="Position of the first body (m)")
+    spacing: float = bounded(low=1e-3, high=100.0, doc="Distance between neighbours (m)")
+    columns: int | None = bounded(
+        None, low=1, high=10000, doc="Bodies in a row; default: a square grid"
+    )
+    heading: float = bounded(0.0, low=-10.0, high=10.0, doc="Heading of all bodies (rad)")
 
     def poses(self, count: int, radius: float, room: Room, taken: Array) -> Array:
         """``(count, 3)`` poses; see ``RandomPlacement.poses``."""
@@ -40,10 +42,12 @@ class RingPlacement:
     """Evenly on a circle, counter-clockwise."""
 
     kind: Literal["ring"] = field(default="ring", kw_only=True)
-    centre: tuple[float, float] = bounded(low=-1e4, high=1e4, doc="[m]")
-    radius: float = bounded(low=1e-3, high=1000.0, doc="[m]")
-    first: float = bounded(0.0, low=-10.0, high=10.0, doc="[rad] where the first one is")
-    facing: Literal["inward", "outward", "along"] = "inward"
+    centre: tuple[float, float] = bounded(low=-1e4, high=1e4, doc="Centre of the ring (m)")
+    radius: float = bounded(low=1e-3, high=1000.0, doc="Radius of the ring (m)")
+    first: float = bounded(0.0, low=-10.0, high=10.0, doc="Polar angle of the first body (rad)")
+    facing: Literal["inward", "outward", "along"] = bounded(
+        "inward", doc="Direction in which the bodies face"
+    )
 
     def poses(self, count: int, radius: float, room: Room, taken: Array) -> Array:
         """``(count, 3)`` poses; see ``RandomPlacement.poses``."""
@@ -61,15 +65,20 @@ class RingPlacement:
 
 @settings
 class RandomPlacement:
-    """Anywhere free, apart from each other and from all that has been placed before."""
+    """At random free places, apart from each other and from everything placed before."""
 
     kind: Literal["random"] = field(default="random", kw_only=True)
     area: tuple[float, float, float, float] | None = bounded(
-        None, low=-1e4, high=1e4, doc="[m] x_min, x_max, y_min, y_max; by default everywhere"
+        None,
+        low=-1e4,
+        high=1e4,
+        doc="Rectangle x_min, x_max, y_min, y_max (m); default: the whole arena",
     )
-    gap: float = bounded(0.01, low=0.0, high=10.0, doc="[m] least distance to anything")
-    heading: float | None = bounded(None, low=-10.0, high=10.0, doc="[rad]; by default random")
-    seed: int = bounded(1, low=0, high=2**62, doc="equal seeds give equal poses")
+    gap: float = bounded(0.01, low=0.0, high=10.0, doc="Least distance to anything else (m)")
+    heading: float | None = bounded(
+        None, low=-10.0, high=10.0, doc="Heading of all bodies (rad); default: random"
+    )
+    seed: int = bounded(1, low=0, high=2**62, doc="Seed; equal seeds give equal poses")
 
     def __post_init__(self) -> None:
         if self.area is not None and not (
@@ -83,7 +92,7 @@ class RandomPlacement:
         Parameters
         ----------
         radius: [m] of the circle about its pose that holds a body.
-        room: whose walls are kept clear. taken: ``(k, 3)`` [m] circles x, y, radius likewise.
+        room: its walls are kept clear. taken: ``(k, 3)`` [m] circles x, y, radius to keep clear.
 
         Raises
         ------

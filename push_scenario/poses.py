@@ -1,4 +1,4 @@
-"""Poses as files write them."""
+"""Poses in files."""
 
 import math
 from typing import Annotated, Any
@@ -31,5 +31,5 @@ def to_array(value: tuple[float, float, float]) -> Array:
 
 
 def to_value(pose: Array) -> list[float]:
-    """What a file writes for a pose ``(3,)``."""
+    """A pose ``(3,)`` in the form of a file."""
     return [float(v) for v in pose]

@@ -1,4 +1,4 @@
-"""Exact questions to an environment: whether a body stands free in it, and how far a point is."""
+"""Exact geometry of an environment: whether a body is free in it, and distances of points."""
 
 import math
 from dataclasses import dataclass
@@ -14,12 +14,12 @@ from push_model.occupancy import MapSpec
 from push_model.outlines import cells_hit, distance, inside, overlap, overlaps_disc
 from push_model.specs import BoxSpec, EnvironmentSpec, ObjectSpec, RobotSpec
 
-_TOUCH = 1e-4  # [m] by which bodies may overlap and count as touching
+_TOUCH = 1e-4  # [m] overlap that counts as touching
 
 
 @dataclass(frozen=True)
 class Footprint:
-    """What a body covers of the floor.
+    """The area of the floor that a body covers.
 
     centre: ``(2,)`` [m]. radius: [m] of the circle about it that holds the body.
     outline: ``(n, 2)`` [m], world frame; None for a disc of that radius.
@@ -31,7 +31,7 @@ class Footprint:
     outline: Array | None
 
     def meets(self, other: "Footprint", touch: float = _TOUCH) -> bool:
-        """Whether two bodies overlap by more than touching does, about ``touch`` [m]."""
+        """Whether two bodies overlap by more than about ``touch`` [m]."""
         apart = float(np.hypot(*(self.centre - other.centre)))
         if apart >= self.radius + other.radius - touch:
             return False
@@ -51,14 +51,14 @@ class Footprint:
 
 
 def robot_footprint(name: str, spec: RobotSpec, pose: Array) -> Footprint:
-    """Of a robot with its axle midpoint at a pose ``(3,)``."""
+    """Footprint of a robot with its axle midpoint at a pose ``(3,)``."""
     round_body = isinstance(spec.bumper, RingBumper)
     outline = None if round_body else se2.transform(pose, spec.outline)
     return Footprint(name, pose[:2], spec.footprint_radius, outline)
 
 
 def object_footprint(name: str, spec: ObjectSpec, pose: Array) -> Footprint:
-    """Of an object with its geometric frame at a pose ``(3,)``."""
+    """Footprint of an object with its geometric frame at a pose ``(3,)``."""
     radius = float(np.hypot(*spec.outline.T).max())
     return Footprint(name, pose[:2], radius, se2.transform(pose, spec.outline))
 
@@ -78,7 +78,7 @@ class Room:
             self.low, self.high = np.array([x0, y0]), np.array([x1, y1])
 
     def trouble(self, body: Footprint, touch: float = _TOUCH) -> str | None:
-        """Why a body cannot stand there: "outside the arena", "in box 2"; None when it can.
+        """Why a body cannot be there, e.g. "outside the arena" or "in box 2"; None if it can.
 
         touch: [m] that counts as touching.
         """
@@ -97,7 +97,7 @@ class Room:
         return None
 
     def clearance(self, points: Array) -> Array:
-        """``(k,)`` [m] of points ``(k, 2)`` from walls and obstacles, 0 in one; never too much."""
+        """``(k,)`` [m] lower bounds of the distances of points ``(k, 2)`` to obstacles."""
         points = np.asarray(points, dtype=np.float64)
         least = np.minimum(points - self.low, self.high - points).min(axis=1)
         for obstacle in self._obstacles:
@@ -118,7 +118,7 @@ class Room:
 
     @cached_property
     def _cell_distance(self) -> Array:
-        """[m] at least, from anywhere in a cell to the nearest occupied one."""
+        """[m] lower bound of the distance from a cell to the nearest occupied one."""
         assert isinstance(self._environment, MapSpec)
         grid = self._environment.grid
         between_centres = distance_transform_edt(~grid.occupied)

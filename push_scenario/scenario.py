@@ -40,7 +40,6 @@ from push_scenario.teams import (
 )
 
 __all__ = [
-    "NODES",
     "Scenario",
     "ScenarioFile",
     "config_directory",
@@ -52,43 +51,27 @@ __all__ = [
     "scenario_names",
 ]
 
-NODES = (
-    "bridge",
-    "planner",
-    "controller",
-    "supervisor",
-    "torque_controller",
-    "group",
-    "optimizer",
-    "swarm",
-)
-"""Nodes that a scenario may have parameters for."""
-
 
 @settings
 class ScenarioFile:
     """The keys of a scenario file."""
 
-    environment: Any = bounded(doc="a name in config/environments, a path, or the contents")
-    robots: dict[str, Any] = bounded(doc="name to type and start, or type, count and placement")
+    environment: Any = bounded(doc="A name in config/environments, a path, or the contents")
+    robots: dict[str, Any] = bounded(doc="Name to type and start, or to type, count and placement")
     objects: dict[str, Any] = field(default_factory=dict)
-    goal: PoseValue | None = bounded(None, doc="[x, y, theta] [m, m, rad] of the first object")
-    goals: tuple[PoseValue, ...] = bounded((), doc="several goals, one after another")
-    trajectory: tuple[TimedPose, ...] = bounded((), doc="timed poses instead of goals")
+    goal: PoseValue | None = bounded(None, doc="Goal [x, y, theta] [m, m, rad] of the first object")
+    goals: tuple[PoseValue, ...] = bounded((), doc="Several goals, reached one after another")
+    trajectory: tuple[TimedPose, ...] = bounded((), doc="Timed poses instead of goals")
     teams: dict[str, TeamEntry] = field(default_factory=dict)
-    events: tuple[Event, ...] = bounded((), doc="what happens while it runs")
+    events: tuple[Event, ...] = bounded((), doc="Events while the scenario runs")
     parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         check_aims(self.goal, self.goals, self.trajectory)
         if self.teams and (self.goal is not None or self.goals or self.trajectory):
-            raise SettingsError("with teams, each has its goals; the scenario has none of its own")
+            raise SettingsError("with teams, goals belong to the teams, not to the scenario")
         if not self.robots:
             raise SettingsError("robots: at least one robot is needed")
-        for node in self.parameters:
-            if node not in NODES:
-                known = ", ".join(NODES)
-                raise SettingsError(f"parameters: unknown node '{node}'; expected one of: {known}")
 
 
 @dataclass(frozen=True)
@@ -118,7 +101,7 @@ class Scenario:
 
     @property
     def text(self) -> str:
-        """The scenario as YAML that needs no other file, every default written out."""
+        """The scenario as YAML with every default written out; it needs no other file."""
         values: dict[str, Any] = {
             "environment": map_to_mapping(self.environment)
             if isinstance(self.environment, MapSpec)
@@ -194,7 +177,8 @@ class Scenario:
         nodes: node name to all of its settings, e.g. ``asdict`` of its settings class. A bag that
             is recorded with these in its scenario does not change when a default does.
         """
-        parameters = {n: _filled(self.parameters.get(n, {}), nodes.get(n, {})) for n in NODES}
+        names = dict.fromkeys((*nodes, *self.parameters))
+        parameters = {n: _filled(self.parameters.get(n, {}), nodes.get(n, {})) for n in names}
         return replace(self, parameters={n: v for n, v in parameters.items() if v})
 
     def check(self, where: str = "scenario") -> None:

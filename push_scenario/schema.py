@@ -1,6 +1,6 @@
 """JSON schemas of scenario, robot, object and environment files, for editors that complete YAML.
 
-The schema of an editor is the file's first line, ``# yaml-language-server: $schema=<path>``.
+A file names its schema in its first line, ``# yaml-language-server: $schema=<path>``.
 """
 
 import json
@@ -13,10 +13,10 @@ from pydantic import TypeAdapter
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
 from push_scenario.bodies import BodyEntry
 from push_scenario.map_file import MapFile
-from push_scenario.scenario import NODES, ScenarioFile
+from push_scenario.scenario import ScenarioFile
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-_NESTED = ("drive", "bumper")  # of these a scenario may replace some keys only
+_NESTED = ("drive", "bumper")  # a scenario may replace single keys of these
 
 
 def schemas() -> dict[str, dict[str, Any]]:
@@ -43,10 +43,7 @@ def schemas() -> dict[str, dict[str, Any]]:
         entry["properties"] = {**changes, **entry["properties"]}
         entry["properties"]["type"] |= _named(kind)
         properties[f"{kind}s"] |= {"additionalProperties": entry}
-    properties["parameters"] |= {
-        "properties": {node: {"type": "object"} for node in NODES},
-        "additionalProperties": False,
-    }
+    properties["parameters"] |= {"additionalProperties": {"type": "object"}}
     return {kind: {"$schema": DIALECT, **schema} for kind, schema in made.items()}
 
 
@@ -67,7 +64,7 @@ def _named(kind: str) -> dict[str, Any]:
 
 
 def _strict(value: Any) -> Any:
-    """The schema with ``kind`` required where it tells the members of a union apart."""
+    """The schema with ``kind`` required where it selects the member of a union."""
     if isinstance(value, list):
         return [_strict(v) for v in value]
     if not isinstance(value, Mapping):

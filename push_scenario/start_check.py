@@ -1,4 +1,4 @@
-"""Whether a scenario can begin: nobody in a wall, in another body, or outside; no goal there."""
+"""Check start poses and goals: not in a wall, not in another body, not outside the arena."""
 
 from collections.abc import Iterable
 
@@ -15,7 +15,7 @@ Objects = dict[str, tuple[ObjectSpec, Array]]
 
 
 def start_troubles(robots: Robots, objects: Objects, room: Room) -> list[str]:
-    """What is wrong with start poses, a line each, with the names of the bodies."""
+    """Problems of start poses, one line each, with the names of the bodies."""
     bodies = [robot_footprint(f"robot '{n}'", s, p) for n, (s, p) in robots.items()]
     bodies += [object_footprint(f"object '{n}'", s, p) for n, (s, p) in objects.items()]
     found = []
@@ -30,7 +30,7 @@ def start_troubles(robots: Robots, objects: Objects, room: Room) -> list[str]:
 
 
 def aim_troubles(teams: Iterable[Team], objects: Objects, room: Room) -> list[str]:
-    """What is wrong with goals and trajectories, a line each."""
+    """Problems of goals and trajectories, one line each."""
     found = []
     for team in teams:
         of_team = f" of team '{team.name}'" if team.name else ""
@@ -54,7 +54,7 @@ def _near(bodies: list[Footprint]) -> list[tuple[Footprint, Footprint]]:
         return []
     centres = np.array([b.centre for b in bodies])
     radii = np.array([b.radius for b in bodies])
-    # Few bodies are large: ask for pairs of small ones, and for each large one's neighbours.
+    # Few bodies are large: search pairs of small ones, and the neighbours of each large one.
     small = radii <= 2.0 * np.median(radii)
     pairs = set()
     at = np.flatnonzero(small)

@@ -12,19 +12,21 @@ from push_scenario.poses import PoseValue, to_array, to_value
 class TimedPose:
     """A pose of a trajectory."""
 
-    at: float = bounded(low=0.0, high=1e6, doc="[s] after the trajectory begins")
-    pose: PoseValue = bounded(doc="[x, y, theta] [m, m, rad], world frame")
+    at: float = bounded(low=0.0, high=1e6, doc="Time after the trajectory begins (s)")
+    pose: PoseValue = bounded(doc="Pose [x, y, theta] [m, m, rad] in the world frame")
 
 
 @settings
 class TeamEntry:
     """A team in a scenario file."""
 
-    robots: tuple[str, ...] = bounded(doc="names of robots or of groups of robots")
-    object: str = bounded("", doc="its object; the scenario's only one need not be named")
-    goal: PoseValue | None = bounded(None, doc="[x, y, theta] [m, m, rad] of the object")
-    goals: tuple[PoseValue, ...] = bounded((), doc="one after another")
-    trajectory: tuple[TimedPose, ...] = bounded((), doc="timed poses of the object")
+    robots: tuple[str, ...] = bounded(doc="Names of robots or of groups of robots")
+    object: str = bounded(
+        "", doc="The object of the team; may be left out if the scenario has only one"
+    )
+    goal: PoseValue | None = bounded(None, doc="Goal [x, y, theta] [m, m, rad] of the object")
+    goals: tuple[PoseValue, ...] = bounded((), doc="Several goals, reached one after another")
+    trajectory: tuple[TimedPose, ...] = bounded((), doc="Timed poses of the object")
 
     def __post_init__(self) -> None:
         check_aims(self.goal, self.goals, self.trajectory)
@@ -52,7 +54,7 @@ class Team:
 
     @property
     def aims(self) -> tuple[Array, ...]:
-        """All poses that the object shall come to, of goals or trajectory."""
+        """All poses of the goals or of the trajectory."""
         return self.goals or tuple(to_array(t.pose) for t in self.trajectory)
 
 
@@ -78,7 +80,7 @@ def goals_of(
 def aims_to_mapping(
     goals: tuple[Array, ...], trajectory: tuple[TimedPose, ...]
 ) -> dict[str, object]:
-    """``goal``, ``goals`` or ``trajectory`` as a file writes them."""
+    """``goal``, ``goals`` or ``trajectory`` in the form of a file."""
     if trajectory:
         return {"trajectory": [{"at": t.at, "pose": list(t.pose)} for t in trajectory]}
     if len(goals) > 1:

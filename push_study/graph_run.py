@@ -17,7 +17,7 @@ from push_bringup.job_result import JobResult, result_of
 from push_bringup.monitor import Pose
 from push_bringup.node_settings import changed, resolved
 from push_bringup.suite import scenario_goals
-from push_bringup.systems import CROWDS, LOCKSTEP, OWNERS, NodeSpec, nodes_of, teams_of
+from push_bringup.systems import LOCKSTEP, NodeSpec, nodes_of, teams_of
 from push_model.arrays import Array
 from push_model.jobs import JobError
 from push_msgs.msg import JobState
@@ -114,8 +114,8 @@ class LockstepRun:
             self.teams: dict[str, TeamRun] = {}
             for team in teams_of(scenario):
                 parts = {s.kind: s for s in specs if s.kind != "bridge" and s.team == team.name}
-                owner = next(k for k in OWNERS if k in parts)
-                names = Names(space(namespace), space(parts[owner].namespace))
+                owner = next(part for part in parts.values() if part.traits.owner)
+                names = Names(space(namespace), space(owner.namespace))
                 observer = Observer(names, team.robots, team.object)
                 nodes.append(observer)
                 self.teams[team.name] = _team_run(made, parts, observer)
@@ -129,9 +129,9 @@ class LockstepRun:
         self.controller, self.planner = first.controller, first.planner
         self.supervisor, self.observer = first.supervisor, first.observer
         kinds = [s.kind for s in specs]
-        owned = [len(s.robots) for s in specs if s.kind in CROWDS]
+        owned = [len(s.robots) for s in specs if s.traits.commands]
         self._commanded = kinds.count("supervisor") + sum(owned)
-        self._listeners = 2 * kinds.count("supervisor") + len(owned) + kinds.count("swarm_agent")
+        self._listeners = sum(s.traits.listens for s in specs)
         self.spinner = Spinner(nodes)
 
     def __enter__(self) -> "LockstepRun":
@@ -229,8 +229,8 @@ class LockstepRun:
 def _team_run(
     made: Mapping[str, Any], parts: Mapping[str, NodeSpec], observer: Observer
 ) -> TeamRun:
-    owner = next(k for k in OWNERS if k in parts)
-    own = {"supervisor": _ROLES, "group": ("group", "optimizer", "group")}
-    kinds = own.get(owner, (owner, owner, owner))
-    controller, planner, supervisor = (made[parts[k].name] for k in kinds)
-    return TeamRun(controller, planner, supervisor, observer)
+    owner = next(k for k, part in parts.items() if part.traits.owner)
+    planner = "optimizer" if "optimizer" in parts else owner
+    kinds = _ROLES if owner == "supervisor" else (owner, planner, owner)
+    controller, planner_node, supervisor = (made[parts[k].name] for k in kinds)
+    return TeamRun(controller, planner_node, supervisor, observer)

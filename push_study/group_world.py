@@ -9,8 +9,12 @@ from types import TracebackType
 
 import numpy as np
 
+from grasp_opt.group_job import GroupJob
+from grasp_opt.sequencing import NoStep
+from grasp_opt.step_planner import StepPlanner, TooFew
 from push_model.arrays import Array
 from push_model.drives import HolonomicDrive
+from push_model.jobs import JobError
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
 from push_study.pool import Row
 from push_study.uncertainty import Uncertainty
@@ -51,6 +55,7 @@ class GroupWorld:
             name: (doubt.draw_robot(name, robot, self._random, self.drawn), pose)
             for name, pose in zip(self.names, starts, strict=True)
         }
+        robots = doubt.draw_robot_friction(robots, self._random, self.drawn)
         self._holonomic = isinstance(robot.drive, HolonomicDrive)
         kind = world_kind(world)
         self._world = kind.make(
@@ -114,3 +119,17 @@ class GroupWorld:
             else:
                 collision = True
         return forces, collision
+
+
+def answer(job: GroupJob, planner: StepPlanner) -> None:
+    """Plan what a job asks for; the world stands still meanwhile."""
+    request = job.request
+    if request is None:
+        return
+    rest = (request.robots, request.dead, np.zeros((0, 3)), request.fewest)
+    try:
+        job.planned(planner.plan(request.pose, request.goal, *rest))
+    except TooFew as error:
+        job.failed(JobError.TOO_HEAVY, str(error))
+    except NoStep as error:
+        job.failed(JobError.PLANNING_FAILED, str(error))

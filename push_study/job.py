@@ -61,6 +61,7 @@ def run_job(
         state = run.reach(believed.goal, meanwhile=meanwhile)
         trace = run.observer.trace
         duration = run.bridge.time
+        latency, spread = run.bridge.applied_latency
     position, orientation = final_errors(trace, believed.goal)
     reached = state is not None and state.error_code == 0
     success = (
@@ -81,4 +82,6 @@ def run_job(
         "min_clearance_m": min_clearance(believed, trace),
         "collisions": trace.collisions,
         "replans": 0 if state is None else int(state.replans),
+        "applied_latency_s": latency,
+        "applied_latency_std_s": spread,
     }, trace

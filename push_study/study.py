@@ -6,9 +6,9 @@ import importlib
 import json
 import os
 import pkgutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -16,7 +16,7 @@ from push_model.settings import SettingsError
 from push_record.revision import revision
 from push_study import experiments
 from push_study.cluster import check_cluster
-from push_study.summary import aggregate
+from push_study.summary import aggregate, known
 from push_study.trials import Row, run_trials
 from push_study.uncertainty import uncertainty
 from sim_bridge.worlds import world_kind
@@ -27,8 +27,9 @@ class StudyOptions:
     """scenarios: names or paths. trials: of each. seed: of the first trial; the next has the next.
 
     scheduler: address of a Dask scheduler; empty for local processes. workers: 0 for one a core.
-    uncertainty: name of how far the world is from what is believed. world: kind of world, for
-    experiments that choose it themselves; the others' is that of their scenarios.
+    uncertainty: name of how far the world is from what is believed. world: kind of world; empty for
+    the experiment's own. asked: names of the options that somebody has set. One that the
+    experiment does not use is refused, see ``Experiment.OPTIONS``.
     """
 
     scenarios: tuple[str, ...]
@@ -39,6 +40,7 @@ class StudyOptions:
     workers: int = 0
     uncertainty: str = "mild"
     world: str = ""
+    asked: frozenset[str] = frozenset()
 
 
 class Experiment(Protocol):
@@ -46,6 +48,10 @@ class Experiment(Protocol):
 
     SCENARIOS: tuple[str, ...]
     """Where none are named."""
+
+    OPTIONS: Mapping[str, str]
+    """Which of the options ``uncertainty`` and ``world`` it uses, with their defaults. What it does
+    not use is refused, and is not written into its summary."""
 
     def tasks(self, options: StudyOptions) -> Sequence[Any]:
         """Dataclasses, one a trial, with ``scenario``, ``seed`` and ``out``. It raises
@@ -55,6 +61,9 @@ class Experiment(Protocol):
     def trial(self, task: Any) -> Row:
         """Run one trial; importable, for it runs in other processes."""
         ...
+
+    # A module may also have ``statistics(rows) -> Mapping[str, Any]``: what the rows amount to
+    # beyond means, by name, for ``aggregate`` in the summary.
 
     def conclude(self, options: StudyOptions, tasks: Sequence[Any], rows: list[Row]) -> None:
         """Draw and print what the rows amount to, beside the thesis's figures."""
@@ -86,32 +95,49 @@ def run_study(name: str, options: StudyOptions) -> dict[str, Any]:
     """
     what = experiment(name)
     _check(options)
+    _refuse_unused(name, what, options)
+    options = replace(options, world=options.world or what.OPTIONS.get("world", ""))
     tasks = what.tasks(options)
-    if options.world and not getattr(what, "CHOOSES_WORLD", False):
-        raise SettingsError(
-            f"world: that of '{name}' is its scenarios', bridge.world; no other can be asked for"
-        )
-    mark = {"experiment": name, "seed": options.seed, "uncertainty": options.uncertainty}
-    mark |= {"world": options.world} if options.world else {}
+    mark = {"experiment": name, "seed": options.seed}
+    mark |= {option: getattr(options, option) for option in what.OPTIONS}
     _claim(options.out, mark | {"revision": revision()})
     with _alone(options.out):
         rows = run_trials(
             what.trial, tasks, options.out / "trials.jsonl", options.scheduler, options.workers
         )
         summary = {
-            "experiment": name,
-            "seed": options.seed,
-            "uncertainty": options.uncertainty,
+            **mark,
             "revision": revision(),
             "requested": len(tasks),
-            "trials": rows,
-            "aggregate": aggregate(rows),
+            "trials": [known(row) for row in rows],
+            "aggregate": aggregate(rows, statistics_of(what, rows)),
         }
-        (options.out / "summary.json").write_text(json.dumps(summary, indent=1) + "\n")
+        (options.out / "summary.json").write_text(
+            json.dumps(summary, indent=1, allow_nan=False) + "\n"
+        )
         if rows:
             _write_table(options.out / "trials.csv", rows)
         what.conclude(options, tasks, rows)
     return summary
+
+
+def statistics_of(what: Any, rows: list[Row]) -> Mapping[str, Any]:
+    """What an experiment makes of its rows besides means, by name."""
+    found: Mapping[str, Any] = what.statistics(rows) if hasattr(what, "statistics") else {}
+    return found
+
+
+def _refuse_unused(name: str, what: Experiment, options: StudyOptions) -> None:
+    """FAULTS 29: an option that does nothing is refused by name."""
+    why = {
+        "uncertainty": "its trials have none to choose",
+        "world": "it is that of its scenarios, bridge.world",
+    }
+    defaults = StudyOptions((), 1, 1, Path())
+    for option, reason in why.items():
+        set_ = option in options.asked or getattr(options, option) != getattr(defaults, option)
+        if set_ and option not in what.OPTIONS:
+            raise SettingsError(f"{option}: '{name}' does not use it: {reason}; leave it out")
 
 
 def complete(summary: dict[str, Any]) -> bool:

@@ -1,10 +1,12 @@
 """How far the world of a trial is from what planner, controller and supervisor believe."""
 
 import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from push_model.arrays import Array
 from push_model.drives import HolonomicDrive
 from push_model.settings import SettingsError
 from push_model.specs import ObjectSpec, RobotSpec
@@ -19,18 +21,22 @@ class Uncertainty:
     """Noise of poses, and what is drawn for the world.
 
     position_noise [m], orientation_noise [rad]: standard deviation. rate [Hz] of the poses.
-    latency: [s] drawn from; believed_latency: [s] what the controller makes good, the drawn one
-    when None. spread: relative, of frictions. contact_friction: drawn from instead, where given.
-    com: [m] up to which the centre of mass is off. own_draws: other ones for each scenario.
+    latency: [s] its mean is drawn from this range; latency_jitter: [s] half width of its uniform
+    distribution in a trial. believed_latency: [s] what the controller makes good, the drawn one
+    when None. spread: relative, of frictions. contact_friction, robot_friction: of robot on object
+    and of robot on robot; drawn from these ranges instead, where given. com: [m] up to which the
+    centre of mass is off. own_draws: other ones for each scenario.
     """
 
     position_noise: float = 2e-4
     orientation_noise: float = 0.0017453
     rate: float = 100.0
     latency: Range = (0.01, 0.01)
+    latency_jitter: float = 0.0
     believed_latency: float | None = None
     spread: float = 0.2
     contact_friction: Range | None = None
+    robot_friction: Range | None = None
     com: float = 0.0
     own_draws: bool = False
 
@@ -53,6 +59,7 @@ class Uncertainty:
             motion_capture__orientation_noise=self.orientation_noise,
             motion_capture__rate=self.rate,
             motion_capture__latency=latency,
+            motion_capture__latency_jitter=self.latency_jitter,
         ).settings("controller", tracker__pose_delay=known)
         drawn: Row = {} if low == high else {"latency_s": latency}
         objects = {}
@@ -61,6 +68,7 @@ class Uncertainty:
         robots = {}
         for name, (robot, start) in believed.robots.items():
             robots[name] = (self.draw_robot(name, robot, random, drawn), start)
+        robots = self.draw_robot_friction(robots, random, drawn)
         return believed, replace(believed, objects=objects, robots=robots), drawn
 
     def _factor(self, random: np.random.Generator) -> float:
@@ -96,19 +104,44 @@ class Uncertainty:
         drawn[f"{name}_wheel_friction"] = drive.wheel_friction
         return replace(robot, drive=drive)
 
+    def draw_robot_friction(
+        self,
+        robots: Mapping[str, tuple[RobotSpec, Array]],
+        random: np.random.Generator,
+        drawn: Row,
+    ) -> dict[str, tuple[RobotSpec, Array]]:
+        """Robots, by name with their starts, with the friction among them in this trial.
+
+        It is one draw for all. A single robot has none.
+        """
+        if len(robots) < 2:
+            return dict(robots)
+        factor = self._factor(random)
+        chosen = (
+            None if self.robot_friction is None else float(random.uniform(*self.robot_friction))
+        )
+        result = {}
+        for name, (robot, start) in robots.items():
+            friction = factor * robot.robot_friction if chosen is None else chosen
+            drawn["robot_friction"] = friction
+            result[name] = (replace(robot, robot_friction=friction), start)
+        return result
+
 
 UNCERTAINTIES = {
     "none": Uncertainty(0.0, 0.0, 100.0, (0.0, 0.0), spread=0.0),
     "mild": Uncertainty(),
-    # A bumper whose friction is a guess, a box whose load is not centred, a motion capture of half
-    # the rate whose latency is known to 20 ms.
+    # Bumpers whose friction is a guess, on the object and on each other; a box whose load is not
+    # centred; a motion capture of half the rate, with jitter, whose latency is known to 20 ms.
     "hard": Uncertainty(
         position_noise=1e-3,
         orientation_noise=float(np.deg2rad(0.5)),
         rate=60.0,
         latency=(0.02, 0.06),
+        latency_jitter=0.005,
         believed_latency=0.04,
         contact_friction=(0.1, 0.4),
+        robot_friction=(0.2, 1.0),
         com=0.01,
         own_draws=True,
     ),

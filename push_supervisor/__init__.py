@@ -1,7 +1,9 @@
 """Supervision of a manipulation (section 2.5): a pure state machine, and its node."""
 
 from push_model.jobs import JobError
-from push_supervisor.machine import Command, Event, Machine, State
+from push_supervisor.commands import Command
+from push_supervisor.events import Event
+from push_supervisor.machine import Machine, State
 from push_supervisor.requests import Moment, Peer, Request, Requests, Step
 from push_supervisor.settings import SupervisorSettings
 from push_supervisor.surroundings import Surroundings

@@ -8,9 +8,13 @@ somebody else, and every job ends with a code.
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Any
 
+from push_model.arrays import Array
 from push_model.jobs import JobError
+from push_model.push_segment import PushSegment
+from push_supervisor import commands, events
+from push_supervisor.commands import Command
+from push_supervisor.events import Event
 from push_supervisor.settings import SupervisorSettings
 
 
@@ -25,57 +29,24 @@ class State(IntEnum):
     DETACHING = 6
 
 
-class Event(IntEnum):
-    """What can happen to the machine. The payload is in the keyword arguments of ``handle``."""
-
-    GOAL = 1  # goal, plan_only
-    EXECUTE = 2
-    CANCEL = 3
-    PLANNED = 4  # segments
-    PLAN_FAILED = 5  # code, message, retry: whether a pre-emptive push could help, crowded
-    PATH = 6  # trajectory
-    PATH_FAILED = 7  # message, crowded: whether other bodies may stand in the way
-    MOTION_DONE = 8
-    MOTION_FAILED = 9  # message, lost: whether the controller itself is gone
-    DISPLACED = 10  # message
-    NEW_MAP = 11  # problem: why what is left of the plan cannot be done on it, or empty
-    CLOCK_RESET = 12
-    ABORT = 13  # code, message: end the job for a reason of the owner's
-
-
-class Command(IntEnum):
-    """What the machine asks of its owner. The payload comes with it."""
-
-    PLAN = 1  # goal, preemptive: a push that leads away first, later: wait a while before
-    CANCEL_PLAN = 2
-    PATH = 3  # segment, later
-    FOLLOW_PATH = 4  # trajectory
-    FOLLOW_APPROACH = 5  # segment
-    FOLLOW_PUSH = 6  # segment
-    FOLLOW_RETREAT = 7
-    STOP = 8
-    FINISH = 9  # code, message
-
-
-Handler = Callable[..., None]
-
-
 @dataclass
 class Machine:
     """One job at a time.
 
     at_goal: tells whether the object is within tolerance of a goal now, and describes the error.
     touching: tells whether the robot may be touching the object now, whoever left it there.
-    pushes, replans: of this job so far.
+    pushes, replans: of this job so far. New plans are bounded between one progress and the next: a
+    push that leaves fewer to do than ever before, since the goal came or the object was moved.
+    Moves of the object by others are bounded likewise between one completed push and the next.
     """
 
     settings: SupervisorSettings
-    at_goal: Callable[[Any], tuple[bool, str]]
+    at_goal: Callable[[Array | None], tuple[bool, str]]
     touching: Callable[[], bool]
     state: State = State.IDLE
     reason: str = "waiting for a goal"
-    goal: Any = None
-    segments: list[Any] = field(default_factory=list)
+    goal: Array | None = None
+    segments: list[PushSegment] = field(default_factory=list)
     index: int = 0
     replans: int = 0
     pushes: int = 0
@@ -83,29 +54,21 @@ class Machine:
     busy: bool = False
 
     def __post_init__(self) -> None:
-        self._out: list[tuple[Command, dict[str, Any]]] = []
+        self._out: list[Command] = []
         self._preemptive = False  # what the planner was asked for
         self._retries = 0
         self._losses = 0
         self._waits = 0
+        self._moves = 0  # of the object by others, since the last push that was completed
         self._recovering = ""  # why a new plan follows the retreat under way
         self._backing_off = ""  # why a plan, no new one, follows it
         self._execute = False
-        self._table: dict[Event, tuple[frozenset[State], Handler]] = {
-            Event.GOAL: (frozenset(State), self._on_goal),
-            Event.EXECUTE: (frozenset({State.IDLE}), self._on_execute),
-            Event.CANCEL: (frozenset(State), self._on_cancel),
-            Event.PLANNED: (frozenset({State.PLANNING}), self._on_planned),
-            Event.PLAN_FAILED: (frozenset({State.PLANNING}), self._on_plan_failed),
-            Event.PATH: (frozenset({State.POSITIONING}), self._on_path),
-            Event.PATH_FAILED: (frozenset({State.POSITIONING}), self._on_path_failed),
-            Event.MOTION_DONE: (_MOVING, self._on_motion_done),
-            Event.MOTION_FAILED: (_MOVING, self._on_motion_failed),
-            Event.DISPLACED: (frozenset({State.POSITIONING, State.APPROACH}), self._on_displaced),
-            Event.NEW_MAP: (frozenset(State), self._on_new_map),
-            Event.CLOCK_RESET: (frozenset(State), self._on_clock_reset),
-            Event.ABORT: (frozenset(State), self._on_abort),
-        }
+        self._renew()
+
+    def _renew(self) -> None:
+        """The bounds on new plans start anew: a new goal, or an object that others have moved."""
+        self._setbacks = 0  # new plans since the last progress
+        self._least: int | None = None  # pushes left to do at the last progress
 
     @property
     def plan_ready(self) -> bool:
@@ -113,26 +76,51 @@ class Machine:
         return self.state is State.IDLE and bool(self.segments)
 
     @property
-    def segment(self) -> Any:
+    def segment(self) -> PushSegment:
         """The push under way or next."""
         return self.segments[self.index]
 
     @property
-    def remaining(self) -> list[Any]:
+    def remaining(self) -> list[PushSegment]:
         """The pushes that are not done yet."""
         done = self.state is State.DETACHING and not self._backing_off
         return self.segments[self.index + done :]
 
-    def handle(self, event: Event, **payload: Any) -> list[tuple[Command, dict[str, Any]]]:
+    def handle(self, event: Event) -> list[Command]:
         """React to an event; one that means nothing in this state changes nothing."""
-        states, handler = self._table[event]
         self._out = []
-        if self.state in states:
-            handler(**payload)
+        state = self.state
+        match event:
+            case events.GoalGiven():
+                self._on_goal(event)
+            case events.CancelCommanded():
+                self._abort(JobError.CANCELED, "canceled")
+            case events.ClockReset():
+                self._abort(JobError.CLOCK_RESET, "the clock went back")
+            case events.JobAborted():
+                self._abort(event.code, event.message)
+            case events.MapChanged():
+                self._on_map(event.problem)
+            case events.ExecuteCommanded() if state is State.IDLE:
+                self._on_execute()
+            case events.PlanFound() if state is State.PLANNING:
+                self._on_plan(event)
+            case events.PlanFailed() if state is State.PLANNING:
+                self._on_plan_failed(event)
+            case events.PathFound() if state is State.POSITIONING:
+                self._on_path(event)
+            case events.PathFailed() if state is State.POSITIONING:
+                self._on_path_failed(event)
+            case events.MotionDone() if state in _MOVING:
+                self._on_motion_done()
+            case events.MotionFailed() if state in _MOVING:
+                self._on_motion_failed(event)
+            case events.ObjectMoved() if state in (State.POSITIONING, State.APPROACH):
+                self._on_moved(event.message)
         return self._out
 
-    def _say(self, command: Command, **payload: Any) -> None:
-        self._out.append((command, payload))
+    def _say(self, command: Command) -> None:
+        self._out.append(command)
 
     def _enter(self, state: State, reason: str) -> None:
         self.state, self.reason = state, reason
@@ -142,21 +130,23 @@ class Machine:
         self.busy = False
         self.segments, self.index = [], 0
         self._enter(State.IDLE, message)
-        self._say(Command.FINISH, code=code, message=message)
+        self._say(commands.Finish(code, message))
 
     def _halt(self) -> None:
         if self.state is State.PLANNING:
-            self._say(Command.CANCEL_PLAN)
+            self._say(commands.CancelPlan())
         elif self.state is not State.IDLE:
-            self._say(Command.STOP)
+            self._say(commands.Stop())
 
-    def _on_goal(self, goal: Any, plan_only: bool = False) -> None:
+    def _on_goal(self, event: events.GoalGiven) -> None:
         self._halt()
         if self.busy:
             self._finish(JobError.PREEMPTED, "a new goal replaces this one")
-        self.goal, self.busy, self.error = goal, True, JobError.NONE
-        self._execute = self.settings.auto_execute and not plan_only
+        self.goal, self.busy, self.error = event.goal, True, JobError.NONE
+        self._execute = self.settings.auto_execute and not event.plan_only
         self.replans = self.pushes = self._retries = self._losses = self._waits = 0
+        self._moves = 0
+        self._renew()
         self._plan("planning for a new goal")
 
     def _plan(self, reason: str, backed_off: bool = False) -> None:
@@ -179,7 +169,7 @@ class Machine:
         """Away from the object before anything else, for a reason to plan or to position."""
         self._backing_off = reason
         self._enter(State.DETACHING, f"backing off first; {reason}")
-        self._say(Command.FOLLOW_RETREAT)
+        self._say(commands.FollowRetreat())
 
     def _backed_off(self, failure: str = "") -> None:
         """Go on with what the robot backed off for, also when it could not."""
@@ -193,24 +183,24 @@ class Machine:
     def _ask_plan(self, reason: str, preemptive: bool = False, later: bool = False) -> None:
         self._preemptive = preemptive
         self._enter(State.PLANNING, reason)
-        self._say(Command.PLAN, goal=self.goal, preemptive=preemptive, later=later)
+        assert self.goal is not None
+        self._say(commands.MakePlan(self.goal, preemptive, later))
 
-    def _on_planned(self, segments: list[Any]) -> None:
-        self.segments, self.index = list(segments), 0
+    def _on_plan(self, event: events.PlanFound) -> None:
+        self.segments, self.index = list(event.segments), 0
         if not self._execute:
             self._enter(State.IDLE, "a plan is ready; waiting for the execute command")
             return
         self._position("a plan was found")
 
-    def _on_plan_failed(
-        self, code: JobError, message: str, retry: bool = False, crowded: bool = False
-    ) -> None:
-        if retry and not self._preemptive:
+    def _on_plan_failed(self, event: events.PlanFailed) -> None:
+        message = event.message
+        if event.retry and not self._preemptive:
             self._ask_plan(f"{message}; looking for a pre-emptive push", preemptive=True)
-        elif crowded and self._may_wait():
+        elif event.crowded and self._may_wait():
             self._ask_plan(f"{message}; waiting for others to make way", later=True)
         else:
-            self._finish(code, message)
+            self._finish(event.code, message)
 
     def _may_wait(self) -> bool:
         """Count another wait for other bodies; False when there have been enough."""
@@ -228,15 +218,15 @@ class Machine:
 
     def _position(self, reason: str, later: bool = False) -> None:
         self._enter(State.POSITIONING, reason)
-        self._say(Command.PATH, segment=self.segment, later=later)
+        self._say(commands.FindPath(self.segment, later))
 
-    def _on_path(self, trajectory: Any) -> None:
+    def _on_path(self, event: events.PathFound) -> None:
         self._enter(State.POSITIONING, f"going to side {self.segment.side}")
-        self._say(Command.FOLLOW_PATH, trajectory=trajectory)
+        self._say(commands.FollowPath(event.trajectory))
 
-    def _on_path_failed(self, message: str, crowded: bool = False) -> None:
-        why = f"no way to side {self.segment.side}: {message}"
-        self._retry(why, move_away=True, crowded=crowded)
+    def _on_path_failed(self, event: events.PathFailed) -> None:
+        why = f"no way to side {self.segment.side}: {event.message}"
+        self._retry(why, move_away=True, crowded=event.crowded)
 
     def _retry(self, message: str, move_away: bool, crowded: bool = False) -> None:
         """Another try at positioning; the robot first backs off when that may help."""
@@ -244,7 +234,7 @@ class Machine:
         if self._retries > self.settings.max_retries and crowded and self._may_wait():
             self._position(f"{message}; waiting for others to make way", later=True)
         elif self._retries > self.settings.max_retries:
-            self._say(Command.STOP)
+            self._say(commands.Stop())
             self._finish(JobError.POSITIONING_FAILED, message)
         elif move_away:
             self._retreat(message)
@@ -254,13 +244,13 @@ class Machine:
     def _retreat(self, why: str) -> None:
         self._recovering = why
         self._enter(State.DETACHING, why)
-        self._say(Command.FOLLOW_RETREAT)
+        self._say(commands.FollowRetreat())
 
     def _on_motion_done(self) -> None:
         self._losses = 0
         if self.state is State.POSITIONING:
             self._enter(State.APPROACH, f"approaching side {self.segment.side}")
-            self._say(Command.FOLLOW_APPROACH, segment=self.segment)
+            self._say(commands.FollowApproach(self.segment))
         elif self.state is State.APPROACH:
             self._retries = 0
             self._push()
@@ -268,6 +258,7 @@ class Machine:
             self.pushes += 1
             self._waits = 0
             following = self.index + 1
+            self._note_progress(len(self.segments) - following)
             if (
                 following < len(self.segments)
                 and self.segments[following].side == self.segment.side
@@ -276,7 +267,7 @@ class Machine:
                 self._push()
             else:
                 self._enter(State.DETACHING, f"push {following} of {len(self.segments)} is done")
-                self._say(Command.FOLLOW_RETREAT)
+                self._say(commands.FollowRetreat())
         else:
             self._detached()
 
@@ -285,7 +276,7 @@ class Machine:
             State.PUSHING,
             f"push {self.index + 1} of {len(self.segments)} on side {self.segment.side}",
         )
-        self._say(Command.FOLLOW_PUSH, segment=self.segment)
+        self._say(commands.FollowPush(self.segment))
 
     def _detached(self) -> None:
         if self._recovering:
@@ -305,18 +296,32 @@ class Machine:
             why = f"the object is off its goal: {error}"
             self._replan(why, JobError.OFF_TARGET, backed_off=True)
 
+    def _note_progress(self, left: int) -> None:
+        """A push is done; left: pushes of the plan that are still to do."""
+        self._moves = 0
+        if self._least is None or left < self._least:
+            self._least, self._setbacks = left, 0
+
     def _replan(
         self, why: str, code: JobError = JobError.EXECUTION_FAILED, backed_off: bool = False
     ) -> None:
-        self.replans += 1
-        if self.replans > self.settings.max_replans:
-            self._say(Command.STOP)
-            self._finish(code, f"{why}; gave up after {self.replans - 1} new plans")
+        self._setbacks += 1
+        if self._setbacks > self.settings.max_replans:
+            self._give_up(code, f"{why}; gave up after {self._setbacks - 1} new plans in a row")
         else:
-            self._plan(f"planning anew: {why}", backed_off)
+            self._plan_anew(why, backed_off)
 
-    def _on_motion_failed(self, message: str, lost: bool = False) -> None:
-        if lost:
+    def _plan_anew(self, why: str, backed_off: bool = False) -> None:
+        self.replans += 1
+        self._plan(f"planning anew: {why}", backed_off)
+
+    def _give_up(self, code: JobError, message: str) -> None:
+        self._say(commands.Stop())
+        self._finish(code, message)
+
+    def _on_motion_failed(self, event: events.MotionFailed) -> None:
+        message = event.message
+        if event.lost:
             self._lost(message)
         elif self.state is State.PUSHING or self.state is State.APPROACH:
             self._retreat(message)
@@ -332,24 +337,31 @@ class Machine:
         """The controller is gone; whoever takes its place starts with the step that was cut off."""
         self._losses += 1
         if self._losses > self.settings.max_losses:
-            self._say(Command.STOP)
+            self._say(commands.Stop())
             self._finish(JobError.NODE_LOST, message)
         elif self.state is State.POSITIONING:
             self._position(message)
         elif self._backing_off:
-            self._say(Command.FOLLOW_RETREAT)
+            self._say(commands.FollowRetreat())
         else:
             self._retreat(self._recovering or message)
 
-    def _on_displaced(self, message: str) -> None:
-        self._say(Command.STOP)
-        self._replan(message)
+    def _on_moved(self, message: str) -> None:
+        """Somebody moved the object: the job begins anew from there."""
+        self._moves += 1
+        if self._moves > self.settings.max_replans:
+            text = f"{message}; it was moved {self._moves} times without a push in between"
+            self._give_up(JobError.OBJECT_MOVED, text)
+            return
+        self._say(commands.Stop())
+        self._renew()
+        self._plan_anew(message)
 
-    def _on_new_map(self, problem: str) -> None:
+    def _on_map(self, problem: str) -> None:
         """A plan that is still being made is the planner's to begin anew."""
         if not problem:
             if self.state is State.POSITIONING:  # the way there may lead through a wall now
-                self._say(Command.STOP)
+                self._say(commands.Stop())
                 self._position("the map has changed")
         elif self.plan_ready:
             self._plan(f"planning anew: {problem}")
@@ -358,15 +370,10 @@ class Machine:
         elif self.state is State.PUSHING:
             self._retreat(problem)
         elif self.state in (State.POSITIONING, State.APPROACH):
-            self._on_displaced(problem)
+            self._say(commands.Stop())
+            self._replan(problem)
 
-    def _on_cancel(self) -> None:
-        self._on_abort(JobError.CANCELED, "canceled")
-
-    def _on_clock_reset(self) -> None:
-        self._on_abort(JobError.CLOCK_RESET, "the clock went back")
-
-    def _on_abort(self, code: JobError, message: str) -> None:
+    def _abort(self, code: JobError, message: str) -> None:
         self._halt()
         if self.busy or self.segments:
             self._finish(code, message)

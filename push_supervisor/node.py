@@ -1,7 +1,6 @@
 """The supervisor node: goals in, questions to planner and controller out, the job's state out."""
 
 import sys
-import time
 from typing import Any
 
 import numpy as np
@@ -27,8 +26,10 @@ from push_ros.process import run_node
 from push_ros.qos import LATCHED, STREAM
 from push_ros.validation import FRAME
 from push_scenario.scenario import Scenario, load_scenario
-from push_supervisor import motions
-from push_supervisor.machine import Command, Event, Machine, State
+from push_supervisor import commands, events, motions
+from push_supervisor.commands import Command, Question
+from push_supervisor.events import Event
+from push_supervisor.machine import Machine, State
 from push_supervisor.peers import Peers
 from push_supervisor.requests import Moment, Peer, Request, Requests, Step
 from push_supervisor.settings import SupervisorSettings
@@ -68,12 +69,10 @@ class SupervisorNode(Node):
         self.surroundings = Surroundings(robot_spec, item_spec, others, self.settings)
         self.machine = Machine(self.settings, self._at_goal, self._touching)
         self._requests = Requests(self.settings)
-        self._wall = 0.0  # [s] that stands still while the world is paused
-        self._looked = time.monotonic()
         self._ticks = 0
         self._displaced = 0
         self._world: Any = None  # what the world says that robot and object are
-        self._queue: list[tuple[Event, dict[str, Any]]] = []
+        self._queue: list[Event] = []
         self._handling = False
         self._diagnostics = Diagnostics(self, self.names, self._diagnose)
         self._poses = PoseFeed(
@@ -132,22 +131,22 @@ class SupervisorNode(Node):
 
     def take_goal(self, goal: Array, plan_only: bool) -> None:
         """See JobOwner."""
-        self._fire(Event.GOAL, goal=goal, plan_only=plan_only)
+        self._fire(events.GoalGiven(goal, plan_only))
 
     def end_job(self, code: JobError, message: str) -> None:
         """See JobOwner."""
-        self._fire(Event.ABORT, code=code, message=message)
+        self._fire(events.JobAborted(code, message))
 
     def execute(self) -> None:
         """See JobOwner."""
-        self._fire(Event.EXECUTE)
+        self._fire(events.ExecuteCommanded())
 
     # The world
 
     def _take_map(self, grid: Grid) -> None:
         if not self.surroundings.take_map(grid):
             return
-        self._fire(Event.NEW_MAP, problem=self.surroundings.blocked(self.machine.remaining))
+        self._fire(events.MapChanged(self.surroundings.blocked(self.machine.remaining)))
 
     def _on_scenario(self, message: String) -> None:
         """Another world: a job ends when its robot or its object is not what it was."""
@@ -170,7 +169,7 @@ class SupervisorNode(Node):
         if frame.verdict is Stamp.REFUSED:
             return
         if frame.verdict is Stamp.RESET:
-            self._fire(Event.CLOCK_RESET)
+            self._fire(events.ClockReset())
         self._ticks += 1
         self._heartbeat_publisher.publish(Header(stamp=frame.stamp, frame_id=FRAME))
         self._tend()
@@ -180,8 +179,7 @@ class SupervisorNode(Node):
                 self._intake.feedback(self._feedback())
 
     def _on_watchdog(self) -> None:
-        """Wall time, for when no frames come."""
-        self._advance()
+        """Wall time, for when no frames come; in lockstep there is always one to come."""
         if self._poses.silence > 0.3:
             self._tend()
 
@@ -200,7 +198,7 @@ class SupervisorNode(Node):
         if self._displaced >= 3:
             self._displaced = 0
             text = f"the object stands {1e3 * way:.0f} mm and {turn:.2f} rad from where the "
-            self._fire(Event.DISPLACED, message=text + "push was to begin")
+            self._fire(events.ObjectMoved(text + "push was to begin"))
 
     def _pose(self, name: str) -> Array | None:
         """The pose ``(3,)`` of a body, None when it is not known now."""
@@ -217,48 +215,41 @@ class SupervisorNode(Node):
 
     # The machine and its requests
 
-    def _fire(self, event: Event, **payload: Any) -> None:
+    def _fire(self, event: Event) -> None:
         """Give an event to the machine and carry out its commands, one event after the other."""
-        self._queue.append((event, payload))
+        self._queue.append(event)
         if self._handling:
             return
         self._handling = True
         try:
             while self._queue:
-                event, payload = self._queue.pop(0)
                 before = (self.machine.state, self.machine.reason)
-                commands = self.machine.handle(event, **payload)
-                for command, arguments in commands:
-                    self._carry_out(command, arguments)
-                ended = any(command is Command.FINISH for command, _ in commands)
+                told = self.machine.handle(self._queue.pop(0))
+                for command in told:
+                    self._carry_out(command)
+                ended = any(isinstance(command, commands.Finish) for command in told)
                 if ended or (self.machine.state, self.machine.reason) != before:
                     self._publish_state()
         finally:
             self._handling = False
 
-    def _carry_out(self, command: Command, arguments: dict[str, Any]) -> None:
-        if command in (Command.STOP, Command.CANCEL_PLAN, Command.FINISH):
+    def _carry_out(self, command: Command) -> None:
+        if isinstance(command, (commands.Stop, commands.CancelPlan, commands.Finish)):
             self._requests.drop()
             self._peers.let_go()
-            if command is Command.FINISH:
-                self._finish(arguments["code"], arguments["message"])
+            if isinstance(command, commands.Finish):
+                self._finish(command.code, command.message)
             return
-        delay = self.settings.wait if arguments.get("later") else 0.0
-        self._requests.begin(Request(command, arguments, delay), self._now())
+        waits = isinstance(command, (commands.MakePlan, commands.FindPath)) and command.later
+        delay = self.settings.wait if waits else 0.0
+        self._requests.begin(Request(command, delay), self._now())
         self._tend()
-
-    def _advance(self) -> None:
-        """Move the wall clock on, but for a pause of the world."""
-        now = time.monotonic()
-        if not self._poses.paused:
-            self._wall += now - self._looked
-        self._looked = now
 
     def _now(self) -> Moment:
         """The clocks and who is there."""
-        self._advance()
         known = self._pose(self.robot) is not None and self._pose(self.object) is not None
-        return Moment(self._wall, self._poses.stamp, known, self._peers.ready)
+        clock = self._poses.clock
+        return Moment(clock.now, self._poses.stamp, known, self._peers.ready, clock.lockstep)
 
     def _tend(self) -> None:
         """See to the request under way."""
@@ -267,47 +258,43 @@ class SupervisorNode(Node):
         if verdict.step is Step.ASK and request is not None:
             if self._requests.asks > 1:
                 self.get_logger().warning(f"{request.peer.value} does not answer; asking again")
-            self._ask(self._requests.number, request)
+            self._ask(self._requests.number, request.command)
         elif verdict.step is Step.LOST:
             self._peers.let_go()
-            self._fire(Event.MOTION_FAILED, message=verdict.message, lost=True)
+            self._fire(events.MotionFailed(verdict.message, lost=True))
         elif verdict.step is Step.GIVE_UP:
-            self._fire(Event.ABORT, code=verdict.code, message=verdict.message)
+            self._fire(events.JobAborted(verdict.code, verdict.message))
 
     def _on_sign(self, number: int) -> None:
         self._requests.sign(number, self._now())
 
-    def _on_answer(self, number: int, event: Event, payload: dict[str, Any]) -> None:
+    def _on_answer(self, number: int, event: Event) -> None:
         if self._requests.answer(number):
-            self._fire(event, **payload)
+            self._fire(event)
 
-    def _ask(self, number: int, request: Request) -> None:
-        """Send what a request asks for; the poses are known."""
+    def _ask(self, number: int, command: Question) -> None:
+        """Send what a command asks for; the poses are known."""
         robot, item = self._pose(self.robot), self._pose(self.object)
         assert robot is not None and item is not None
-        near, peers, arguments = self.surroundings, self._peers, request.arguments
+        near, peers = self.surroundings, self._peers
         bodies = {name: self._pose(name) for name in near.others}
         heartbeat = self.settings.heartbeat_timeout
-        if request.command is Command.PLAN:
-            goal, stamp = arguments["goal"], self._poses.stamp
-            first = arguments["preemptive"]
-            peers.plan(number, item, goal, stamp, first, near.bodies(bodies))
-        elif request.command is Command.PATH:
-            wait = motions.standoff(arguments["segment"], item)
-            circles = near.on_the_way(item, bodies)
-            peers.path(number, robot, wait, circles, crowded=len(circles) > 1)
-        elif request.command is Command.FOLLOW_PUSH:
-            segment = arguments["segment"]
-            peers.push(number, segment, near.push(segment), heartbeat)
-        else:
-            if request.command is Command.FOLLOW_PATH:
-                way = arguments["trajectory"]
-                circles = near.follow(way, item)
-            elif request.command is Command.FOLLOW_APPROACH:
-                way, circles = near.approach(arguments["segment"], robot, item)
-            else:
-                way, circles = near.retreat(robot, item)
-            peers.move(number, way, circles, heartbeat)
+        match command:
+            case commands.MakePlan(goal, preemptive):
+                stamp, others = self._poses.stamp, near.bodies(bodies)
+                peers.plan(number, item, goal, stamp, preemptive, others)
+            case commands.FindPath(segment):
+                circles = near.on_the_way(item, bodies)
+                wait = motions.standoff(segment, item)
+                peers.path(number, robot, wait, circles, crowded=len(circles) > 1)
+            case commands.FollowPush(segment):
+                peers.push(number, segment, near.push(segment), heartbeat)
+            case commands.FollowPath(way):
+                peers.move(number, way, near.follow(way, item), heartbeat)
+            case commands.FollowApproach(segment):
+                peers.move(number, *near.approach(segment, robot, item), heartbeat)
+            case commands.FollowRetreat():
+                peers.move(number, *near.retreat(robot, item), heartbeat)
 
     # Outputs
 

@@ -25,10 +25,11 @@ from push_ros.conversions import (
 )
 from push_ros.names import Names
 from push_ros.validation import InvalidMessage
-from push_supervisor.machine import Event
+from push_supervisor import events
+from push_supervisor.events import Event
 from push_supervisor.requests import Peer
 
-Answered = Callable[[int, Event, dict[str, Any]], None]
+Answered = Callable[[int, Event], None]
 """Called with the number of a question, and the event that its answer is."""
 
 _PLAN_ERRORS = {
@@ -100,9 +101,10 @@ class Peers:
             obstacles=circles_to_ros(bodies),
         )
 
-        def failed(code: JobError, message: str, **reasons: bool) -> None:
-            payload = {"code": code, "message": message, **reasons}
-            self._answered(number, Event.PLAN_FAILED, payload)
+        def failed(
+            code: JobError, message: str, retry: bool = False, crowded: bool = False
+        ) -> None:
+            self._answered(number, events.PlanFailed(code, message, retry, crowded))
 
         def done(result: Any) -> None:
             if result is None:
@@ -118,11 +120,11 @@ class Peers:
                 )
                 return
             try:
-                segments = [segment_from_ros(s) for s in result.plan.segments]
+                segments = tuple(segment_from_ros(s) for s in result.plan.segments)
             except InvalidMessage as problem:
                 failed(JobError.PLANNING_FAILED, f"the plan is not valid: {problem}")
                 return
-            self._answered(number, Event.PLANNED, {"segments": segments})
+            self._answered(number, events.PlanFound(segments))
 
         self._planner.send(request, done, lambda feedback: self._sign(number))
 
@@ -136,8 +138,7 @@ class Peers:
         )
 
         def failed(message: str) -> None:
-            payload = {"message": message, "crowded": crowded}
-            self._answered(number, Event.PATH_FAILED, payload)
+            self._answered(number, events.PathFailed(message, crowded))
 
         def done(future: Any) -> None:
             answer = future.result()
@@ -149,7 +150,7 @@ class Peers:
             except InvalidMessage as problem:
                 failed(str(problem))
                 return
-            self._answered(number, Event.PATH, {"trajectory": trajectory})
+            self._answered(number, events.PathFound(trajectory))
 
         self._paths.call_async(request).add_done_callback(done)
 
@@ -182,12 +183,12 @@ class Peers:
         def done(result: Any) -> None:
             if result is None:
                 text = "the controller rejected the trajectory"
-                self._answered(number, Event.MOTION_FAILED, {"message": text})
+                self._answered(number, events.MotionFailed(text))
             elif result.error_code == FollowTrajectory.Result.NONE:
-                self._answered(number, Event.MOTION_DONE, {})
+                self._answered(number, events.MotionDone())
             elif result.error_code == FollowTrajectory.Result.CLOCK_RESET:
-                self._answered(number, Event.CLOCK_RESET, {})
+                self._answered(number, events.ClockReset())
             else:
-                self._answered(number, Event.MOTION_FAILED, {"message": result.error_msg})
+                self._answered(number, events.MotionFailed(result.error_msg))
 
         self._controller.send(goal, done, lambda feedback: self._sign(number))

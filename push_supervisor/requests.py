@@ -2,18 +2,20 @@
 
 The state machine commands; a node is asked as soon as it is there and the poses are known. One that
 dies in the middle of its work never answers. Its servers stay in the graph for seconds, and those
-of one started in its place look the same: only signs of life tell. Those of the controller are
-measured in pose time, which stands still with the poses, and in wall time, for a simulation that
-runs fast; those of the planner in wall time, which it works in.
+of one started in its place look the same: only signs of life tell. The controller must give one in
+time by the clock of the poses, which stands still with them, and by the owner's clock, for a
+simulation that runs fast. The planner must give one in time by the owner's clock. In lockstep the
+world does not wait for the planner, which may take any time there: it is lost only when its server
+has left the graph.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
-from typing import Any
 
 from push_model.jobs import JobError
-from push_supervisor.machine import Command
+from push_supervisor import commands
+from push_supervisor.commands import Question
 from push_supervisor.settings import SupervisorSettings
 
 ASKS = 3
@@ -28,40 +30,41 @@ class Peer(Enum):
     CONTROLLER = "the controller"
 
 
-PEERS = {
-    Command.PLAN: Peer.PLANNER,
-    Command.PATH: Peer.PATHS,
-    Command.FOLLOW_PATH: Peer.CONTROLLER,
-    Command.FOLLOW_APPROACH: Peer.CONTROLLER,
-    Command.FOLLOW_PUSH: Peer.CONTROLLER,
-    Command.FOLLOW_RETREAT: Peer.CONTROLLER,
+PEERS: Mapping[type[Question], Peer] = {
+    commands.MakePlan: Peer.PLANNER,
+    commands.FindPath: Peer.PATHS,
+    commands.FollowPath: Peer.CONTROLLER,
+    commands.FollowApproach: Peer.CONTROLLER,
+    commands.FollowPush: Peer.CONTROLLER,
+    commands.FollowRetreat: Peer.CONTROLLER,
 }
 """Who is asked for what."""
 
 
 @dataclass(frozen=True)
 class Moment:
-    """wall [s]: a clock that stands still while the world is paused; stamp [s]: of the poses;
-    poses: whether those of robot and object are known; ready: whether a peer's server is there."""
+    """clock [s]: see ``push_ros.pace_feed.LivenessClock``; stamp [s]: of the poses; poses: whether
+    those of robot and object are known; ready: whether a peer's server is there; lockstep: whether
+    the world waits for its controllers."""
 
-    wall: float
+    clock: float
     stamp: float
     poses: bool
     ready: Callable[[Peer], bool]
+    lockstep: bool = False
 
 
 @dataclass(frozen=True)
 class Request:
-    """What to ask: the command and what comes with it. delay: [s] of pose time to wait before."""
+    """What to ask. delay: [s] of pose time to wait before."""
 
-    command: Command
-    arguments: Mapping[str, Any] = field(default_factory=dict)
+    command: Question
     delay: float = 0.0
 
     @property
     def peer(self) -> Peer:
         """Who is asked."""
-        return PEERS[self.command]
+        return PEERS[type(self.command)]
 
 
 class Step(Enum):
@@ -98,8 +101,8 @@ class Requests:
         self.asks = 0
         self._asked = False
         self._not_before = 0.0  # [s] pose time
-        self._missing: float | None = None  # [s] wall time since when it could not be asked
-        self._sign_wall = self._sign_stamp = 0.0
+        self._missing: float | None = None  # [s] by the clock since when it could not be asked
+        self._sign_clock = self._sign_stamp = 0.0
 
     def begin(self, request: Request, now: Moment) -> None:
         """Take a request in the place of whatever is under way."""
@@ -126,8 +129,8 @@ class Requests:
                 return _WAIT
             return self._ask(now)
         if self._missing is None:
-            self._missing = now.wall
-        if now.wall - self._missing <= self.settings.node_timeout:
+            self._missing = now.clock
+        if now.clock - self._missing <= self.settings.node_timeout:
             return _WAIT
         peer = self.request.peer
         self.drop()
@@ -138,7 +141,7 @@ class Requests:
     def sign(self, number: int, now: Moment) -> None:
         """A sign of life of whoever was asked with this number."""
         if number == self.number and self._asked:
-            self._sign_wall, self._sign_stamp = now.wall, now.stamp
+            self._sign_clock, self._sign_stamp = now.clock, now.stamp
 
     def answer(self, number: int) -> bool:
         """Whether an answer is the one waited for, and not a late one; the request is done then."""
@@ -151,12 +154,14 @@ class Requests:
         self.number += 1
         self.asks += 1
         self._asked = True
-        self._sign_wall, self._sign_stamp = now.wall, now.stamp
+        self._sign_clock, self._sign_stamp = now.clock, now.stamp
         return _ASK
 
     def _listen(self, request: Request, now: Moment) -> Verdict:
         """Whether the silence has lasted too long."""
-        silence = now.wall - self._sign_wall
+        if now.lockstep and request.peer is not Peer.CONTROLLER and now.ready(request.peer):
+            return _WAIT
+        silence = now.clock - self._sign_clock
         if request.peer is Peer.CONTROLLER:
             silence = min(silence, now.stamp - self._sign_stamp)
             if silence <= self.settings.controller_timeout:

@@ -9,40 +9,109 @@ class SupervisorSettings:
 
     auto_execute: bool = True
     position_tolerance: float = bounded(
-        0.012, low=1e-3, high=1.0, doc="[m] of the object at the goal"
+        0.012,
+        low=1e-3,
+        high=1.0,
+        doc="Distance of the object from its goal at which it has arrived (m).",
     )
-    orientation_tolerance: float = bounded(0.06, low=1e-3, high=3.2, doc="[rad] at the goal")
+    orientation_tolerance: float = bounded(
+        0.06,
+        low=1e-3,
+        high=3.2,
+        doc="Angle of the object from its goal at which it has arrived (rad).",
+    )
     displacement: float = bounded(
-        0.02, low=1e-3, high=1.0, doc="[m] off its planned start at which a plan is dropped"
+        0.02,
+        low=1e-3,
+        high=1.0,
+        doc="Distance of the object from the planned start of a push at which the plan is dropped, "
+        "because somebody has moved the object (m).",
     )
-    displacement_turn: float = bounded(0.12, low=1e-3, high=3.2, doc="[rad] likewise")
-    max_replans: int = bounded(4, low=0, high=100, doc="new plans within one job")
-    max_retries: int = bounded(2, low=0, high=100, doc="further tries to position in a row")
+    displacement_turn: float = bounded(
+        0.12,
+        low=1e-3,
+        high=3.2,
+        doc="Angle of the object from the planned start of a push at which the plan is dropped, "
+        "because somebody has moved the object (rad).",
+    )
+    max_replans: int = bounded(
+        4,
+        low=0,
+        high=100,
+        doc="Largest number of new plans in a row without progress. Progress is a push that leaves "
+        "fewer pushes to do than before. It also bounds how often somebody may move the object "
+        "before another push is completed.",
+    )
+    max_retries: int = bounded(
+        2,
+        low=0,
+        high=100,
+        doc="Further attempts in a row to position the robot at a side of the object.",
+    )
     max_losses: int = bounded(
-        40, low=0, high=10000, doc="times in a row that the controller may be gone"
+        40,
+        low=0,
+        high=10000,
+        doc="Times in a row that the controller node may be lost until the job ends.",
     )
     max_waits: int = bounded(
-        10, low=0, high=10000, doc="waits in a row for other bodies to make way"
+        10, low=0, high=10000, doc="Waits in a row for other bodies to make way."
     )
     wait: float = bounded(
-        3.0, low=0.1, high=600.0, doc="[s] of pose time that each of those waits takes"
+        3.0,
+        low=0.1,
+        high=600.0,
+        doc="Duration of one wait for other bodies to make way, in the time of the poses (s).",
     )
-    approach_speed: float = bounded(0.04, low=1e-3, high=2.0, doc="[m/s] to contact and back")
-    acceleration: float = bounded(0.1, low=1e-3, high=10.0, doc="[m/s^2] of those motions")
-    detach_distance: float = bounded(0.06, low=5e-3, high=2.0, doc="[m] backed off after a push")
-    obstacle_margin: float = bounded(0.008, low=0.0, high=1.0, doc="[m] robot body to obstacles")
+    approach_speed: float = bounded(
+        0.04, low=1e-3, high=2.0, doc="Speed of the robot to contact and back (m/s)."
+    )
+    acceleration: float = bounded(
+        0.1,
+        low=1e-3,
+        high=10.0,
+        doc="Acceleration of the robot on its way to contact and back (m/s^2).",
+    )
+    detach_distance: float = bounded(
+        0.06, low=5e-3, high=2.0, doc="Distance that the robot backs off after a push (m)."
+    )
+    obstacle_margin: float = bounded(
+        0.008,
+        low=0.0,
+        high=1.0,
+        doc="Least distance between the robot's body and an obstacle (m).",
+    )
     heartbeat_timeout: float = bounded(
-        0.25, low=0.05, high=10.0, doc="[s] without the supervisor until a robot stops"
+        0.25,
+        low=0.05,
+        high=10.0,
+        doc="Time without a heartbeat of the supervisor after which the robot stops (s).",
     )
     controller_timeout: float = bounded(
-        1.0, low=0.2, high=60.0, doc="[s] without a sign of the controller until it counts as lost"
+        1.0,
+        low=0.2,
+        high=60.0,
+        doc="Time without feedback of the controller after which it counts as lost (s). It must "
+        "pass by the poses and by the wall clock; in lockstep by the poses alone.",
     )
     node_timeout: float = bounded(
-        20.0, low=0.5, high=600.0, doc="[s] wall time to wait for a lost node to return"
+        20.0,
+        low=0.5,
+        high=600.0,
+        doc="Time to wait for a node that is not in the graph (s). Wall time; in lockstep the time "
+        "of the poses.",
     )
     answer_timeout: float = bounded(
-        10.0, low=0.5, high=600.0, doc="[s] wall time without a sign of the planner: ask again"
+        10.0,
+        low=0.5,
+        high=600.0,
+        doc="Wall time without a sign of the planner after which it is asked again (s). In "
+        "lockstep a planner that is in the graph may take any time.",
     )
     pose_timeout: float = bounded(
-        5.0, low=0.2, high=60.0, doc="[s] wall time without poses until they count as lost"
+        5.0,
+        low=0.2,
+        high=60.0,
+        doc="Wall time without poses after which they count as lost (s). In lockstep they never "
+        "do: the world waits for its controllers, and everybody else for the world.",
     )

@@ -1,1 +1,1 @@
-"""What a person sees: a live page, and reports from bags."""
+"""The live page, and reports from bags."""

@@ -1,4 +1,4 @@
-"""A run as a moving picture."""
+"""A run as an animation."""
 
 from pathlib import Path
 from typing import Any
@@ -17,13 +17,13 @@ _RATE = 15.0  # [Hz] pictures
 
 
 def write_animation(contents: BagContents, path: Path, frames: int = 90) -> None:
-    """Write a GIF of so many frames, evenly spread over the run.
+    """Write a GIF with frames evenly spread over the run.
 
-    What does not move is drawn once.
+    Bodies that do not move are drawn once.
 
     Raises
     ------
-    ValueError: there is no frame of poses.
+    ValueError: the run has no poses.
     """
     if not len(contents.time):
         raise ValueError("a run without poses cannot be animated")

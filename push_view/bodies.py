@@ -1,4 +1,4 @@
-"""The bodies of a scenario as they are drawn: many of few types."""
+"""The bodies of a scenario as they are drawn: many bodies of few types."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +14,7 @@ ROBOT, OBJECT = "#2a62c9", "#d0751c"
 
 @dataclass(frozen=True)
 class BodyType:
-    """outline: ``(n, 2)`` [m] in the frame of the poses; robot: or else an object."""
+    """outline: ``(n, 2)`` [m] in the frame of the poses; robot: false for an object."""
 
     outline: Array
     robot: bool
@@ -29,7 +29,7 @@ class BodyType:
 class Bodies:
     """All bodies: robots first, then objects.
 
-    types: those that look different; type_of: ``(n,)`` index into them of each body.
+    types: those that look different; type_of: ``(n,)`` index of the type of each body.
     """
 
     names: tuple[str, ...]
@@ -63,7 +63,7 @@ def bodies_of(scenario: Scenario) -> Bodies:
     """The bodies of a scenario; those with equal outlines share a type."""
     types: list[BodyType] = []
     index_of: dict[tuple[bool, bytes], int] = {}
-    index_of_spec: dict[int, int] = {}  # bodies of one type often share what says so
+    index_of_spec: dict[int, int] = {}  # bodies of one type often share their spec
     names: list[str] = []
     type_of: list[int] = []
     for robot, specs in ((True, scenario.robots), (False, scenario.objects)):

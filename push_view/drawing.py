@@ -1,6 +1,5 @@
-"""Pictures of a run with matplotlib: the map, bodies, ways, goals; for one body or a thousand."""
+"""Pictures of a run with matplotlib: map, bodies, paths, goals; for one body or a thousand."""
 
-import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -12,14 +11,12 @@ from matplotlib.patches import Polygon
 from push_model import se2
 from push_model.arrays import Array
 from push_model.occupancy import OccupancyGrid
-from push_record.contents import BagContents, GroupPushes, Job
+from push_record.contents import BagContents, Job
 from push_view.bodies import Bodies, bodies_of
 
-PLAN, GOAL, INK, FORCE = "#777777", "#c22f3d", "#222222", "#1b7837"
+PLAN, GOAL, INK = "#777777", "#c22f3d", "#222222"
 
 _NAMED = 6  # bodies that have a name each in the legend
-_FORCES_DRAWN = 2  # moments of a group's push whose forces are drawn
-_PER_NEWTON = 0.12  # [m]
 _WAY_POINTS = 2000  # of all that a way is drawn with
 
 
@@ -47,7 +44,7 @@ def draw_body(axes: Axes, outline: Array, pose: Array, color: str, **style: Any)
 
 
 def body_vertices(bodies: Bodies, poses: dict[str, Array], moment: int) -> dict[str, list[Array]]:
-    """World outlines ``(n, 2)`` [m] of the bodies seen at a moment, by colour."""
+    """World outlines ``(n, 2)`` [m] of the bodies seen at one time, by colour."""
     result: dict[str, list[Array]] = {t.color: [] for t in bodies.types}
     for name, type_of in zip(bodies.names, bodies.type_of, strict=True):
         if name in poses and np.isfinite(poses[name][moment]).all():
@@ -65,7 +62,7 @@ def draw_bodies(axes: Axes, vertices: dict[str, list[Array]], **style: Any) -> N
 
 
 def draw_ways(axes: Axes, bodies: Bodies, poses: dict[str, Array]) -> None:
-    """Where all bodies went; each named in the legend when they are few, or else by kind."""
+    """Paths of all bodies; each is named in the legend if they are few, otherwise by kind."""
     few = len(poses) <= _NAMED
     named: set[str] = set()
     for kind in bodies.types:
@@ -91,7 +88,7 @@ def draw_ways(axes: Axes, bodies: Bodies, poses: dict[str, Array]) -> None:
 
 
 def moments(count: int, bodies: int) -> Array:
-    """Indices of the frames in which bodies are drawn: fewer, the more bodies there are."""
+    """Indices of the frames in which bodies are drawn; the more bodies, the fewer frames."""
     if count == 0:
         return np.zeros(0, dtype=int)
     snapshots = 7 if bodies <= _NAMED else 2 if bodies <= 50 else 1
@@ -105,9 +102,7 @@ def draw_jobs(axes: Axes, bodies: Bodies, jobs: Iterable[Job]) -> None:
     planned = aimed = False
     for job in jobs:
         for way in job.plan:
-            what = "object" if job.system == "group" else "axle"
-            label = None if planned else f"plan ({what})"
-            axes.plot(*way.T, color=PLAN, lw=1.0, ls="--", label=label)
+            axes.plot(*way.T, color=PLAN, lw=1.0, ls="--", label=None if planned else "plan")
             planned = True
         if job.goal is not None and job.object in bodies.names:
             outline = bodies.type(job.object).outline
@@ -116,34 +111,12 @@ def draw_jobs(axes: Axes, bodies: Bodies, jobs: Iterable[Job]) -> None:
             aimed = True
 
 
-def draw_forces(axes: Axes, push: GroupPushes) -> None:
-    """Forces and friction cones of a push at a few moments, into a map's axes [m]."""
-    moments = np.linspace(0, len(push.rows) - 1, _FORCES_DRAWN + 2)[1:-1].astype(int)
-    half = math.atan(push.friction)
-    for k in moments.tolist():
-        for point, normal, force in zip(
-            push.points[k], push.normals[k], push.forces[k], strict=True
-        ):
-            tail = point - _PER_NEWTON * force
-            axes.annotate(
-                "", point, tail, arrowprops={"arrowstyle": "->", "color": FORCE, "lw": 1.0}
-            )
-            heading = math.atan2(normal[1], normal[0])
-            for edge in (heading - half, heading + half):
-                away = point + 0.08 * np.array([math.cos(edge), math.sin(edge)])
-                axes.plot(*np.column_stack([point, away]), color=FORCE, lw=0.5, alpha=0.7)
-
-
 def draw_trajectory(axes: Axes, contents: BagContents, jobs: Iterable[Job] | None = None) -> None:
-    """Map, plans and goals of some teams or all, ways of all bodies, them and forces at moments."""
+    """Map, plans and goals of some teams or all, ways of all bodies, them at moments."""
     bodies = bodies_of(contents.scenario)
     draw_map(axes, contents.scenario.grid)
     draw_jobs(axes, bodies, contents.jobs.values() if jobs is None else jobs)
     draw_ways(axes, bodies, contents.poses)
-    for job in contents.jobs.values() if jobs is None else jobs:
-        for push in job.pushes:
-            if push.rows:
-                draw_forces(axes, push)
     alpha = 0.35 if len(contents.poses) <= _NAMED else 0.6
     for moment in moments(len(contents.time), len(contents.poses)):
         vertices = body_vertices(bodies, contents.poses, int(moment))

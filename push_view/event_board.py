@@ -1,6 +1,6 @@
-"""What pages are shown now: the newest event of each name, for any number of streams.
+"""The newest event of each name, for any number of streams to pages.
 
-A stream that is slow gets fewer events, never old ones. Safe from any thread.
+A slow stream gets fewer events, never outdated ones. Thread-safe.
 """
 
 import json
@@ -9,7 +9,7 @@ from typing import Any
 
 
 class EventBoard:
-    """Newest server-sent event by name. An event equal to the one before is none."""
+    """Newest server-sent event by name. An event equal to the previous one is dropped."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -17,9 +17,9 @@ class EventBoard:
         self._version = 0
 
     def put(self, name: str, kind: str, data: Any) -> None:
-        """Replace the event of a name; raises ValueError for what is not JSON, e.g. nan.
+        """Replace the event of a name; raises ValueError for values that are not JSON, e.g. nan.
 
-        kind: the event's type, as pages know it.
+        kind: the type of the event for the page.
         """
         text = json.dumps(data, allow_nan=False, separators=(",", ":"))
         event = f"event: {kind}\ndata: {text}\n\n".encode()
@@ -35,7 +35,7 @@ class EventBoard:
             self._events.pop(name, None)
 
     def since(self, version: int) -> tuple[int, bytes]:
-        """The version now, and all events newer than a version, in the order they came in."""
+        """The current version, and all events newer than a version, in order of arrival."""
         with self._lock:
             newer = sorted(e for e in self._events.values() if e[0] > version)
             return self._version, b"".join(event for _, event in newer)

@@ -1,8 +1,9 @@
-"""The page over HTTP: its files, the map, a stream of events, and what it asks for.
+"""The page over HTTP: its files, the map, a stream of events, and its requests.
 
-Who may ask says ``who_may_ask``. Streams are server-sent events: what ``EventBoard`` holds, and
-five times a second a ``suite`` event, by which the page knows that the server lives and the server
-that the page does. Their number is bounded; one whose page has gone, or does not read, is dropped.
+``who_may_ask`` decides which requests are answered. Streams are server-sent events: the contents of
+``EventBoard``, and a ``suite`` event five times a second, by which page and server know that the
+other one is alive. The number of streams is bounded. A stream whose page is closed or does not read
+is dropped.
 """
 
 import json
@@ -24,9 +25,9 @@ STREAMS = 16
 """Pages that can be open at a time."""
 
 _BEAT = 0.2  # [s] between two suite events
-_PATIENCE = 5.0  # [s] for a page that does not read, or a connection that says nothing
+_PATIENCE = 5.0  # [s] until a page that does not read, or a silent connection, is dropped
 _LONGEST = 10_000  # [bytes] of a request
-_BUFFER = 1 << 16  # [bytes] that may be under way to a page
+_BUFFER = 1 << 16  # [bytes] that may be in transit to a page
 _SAFETY = {
     "Cache-Control": "no-store",
     "Content-Security-Policy": "default-src 'self'; frame-ancestors 'none'",
@@ -46,7 +47,7 @@ def page_files() -> dict[str, tuple[str, bytes]]:
 
 
 class _Shared:
-    """What all requests share."""
+    """Data that all requests share."""
 
     def __init__(self, node: ViewerNode, rule: WhoMayAsk, streams: int) -> None:
         self.node, self.rule = node, rule
@@ -66,7 +67,7 @@ class _Handler(BaseHTTPRequestHandler):
         super().__init__(*arguments)
 
     def log_message(self, *_: Any) -> None:
-        """Say nothing of each request."""
+        """Do not log each request."""
 
     def do_GET(self) -> None:
         """A file of the page, the map, the suite, or the events."""
@@ -97,7 +98,7 @@ class _Handler(BaseHTTPRequestHandler):
         if not plain or int(lengths[0]) > _LONGEST or "Transfer-Encoding" in self.headers:
             refusal = refusal or "a request of known and small length was expected"
         if refusal:
-            # what follows on this connection is not read, least of all as a request
+            # the rest of this connection is not read
             self.close_connection = True
             self._refuse(403, refusal)
             return
@@ -139,7 +140,7 @@ class _Handler(BaseHTTPRequestHandler):
             return
         try:
             self.connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _BUFFER)
-            if hasattr(socket, "TCP_USER_TIMEOUT"):  # a machine that has gone acknowledges nothing
+            if hasattr(socket, "TCP_USER_TIMEOUT"):  # a machine that is gone acknowledges nothing
                 limit = round(1e3 * _PATIENCE)
                 self.connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, limit)
             self.send_response(200)
@@ -155,7 +156,7 @@ class _Handler(BaseHTTPRequestHandler):
             self.close_connection = True
 
     def _stream(self) -> None:
-        """Until the page goes; each event that is new, and the suite's at least every beat."""
+        """Send each new event, and the suite's at least every beat, until the page is closed."""
         shared = self._shared
         version, before, beat = 0, b"", -math.inf
         while not shared.stopping.is_set():
@@ -191,7 +192,7 @@ class _Server(ThreadingHTTPServer):
     daemon_threads = True
 
     def handle_error(self, *_: Any) -> None:
-        """A connection that broke off is no news."""
+        """A broken connection is not reported."""
 
 
 class PageServer:

@@ -1,4 +1,4 @@
-"""The newest pose of every body as a page is told them: whole numbers in a few arrays."""
+"""The newest pose of every body in the form for the page: integers in a few arrays."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from push_ros.conversions import time_from_ros
 from push_ros.validation import FARTHEST
 from push_view.bodies import Bodies
 
-_LENGTH, _ANGLE = 1e4, 1e3  # units a metre and a radian: 0.1 mm, 1 mrad
+_LENGTH, _ANGLE = 1e4, 1e3  # units per metre and per radian: 0.1 mm, 1 mrad
 _STALE = 1.0  # [s] of pose time after which a body that is not seen counts as lost
 
 
@@ -27,7 +27,7 @@ class PoseTable:
         self._columns = np.zeros(0, dtype=np.intp)
 
     def take(self, message: Any) -> None:
-        """Enter a frame of push_msgs/Poses; poses of strangers and implausible ones are left out.
+        """Add a frame of push_msgs/Poses; unknown bodies and implausible poses are left out.
 
         Raises
         ------
@@ -44,9 +44,9 @@ class PoseTable:
         frame = np.column_stack([np.asarray(c, dtype=np.float64) for c in columns])
         frame = frame[self._columns]
         with np.errstate(invalid="ignore"):
-            good = np.abs(frame).max(axis=1, initial=0.0) < FARTHEST  # nan is not
+            good = np.abs(frame).max(axis=1, initial=0.0) < FARTHEST  # false for nan
         time = time_from_ros(message.header.stamp)
-        if time < self.time:  # the world began anew
+        if time < self.time:  # the world was reset
             self._seen[:] = -np.inf
         self.time = time
         self.poses[self._rows[good]] = frame[good]

@@ -1,4 +1,4 @@
-"""From a bag to a report: where everything went, and a panel a team."""
+"""A report from a bag: paths of all bodies, and a panel for each team."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,10 +16,10 @@ from push_model import se2
 from push_record.contents import BagContents, Job, load
 from push_view.animation import write_animation
 from push_view.drawing import INK, draw_trajectory
-from push_view.panels import panel_of
+from push_view.report_panel import draw_report
 
 PRODUCTS = ("trajectory.png", "animation.gif", "report.pdf")
-"""Files that a report consists of."""
+"""Files of a report."""
 
 _PAGE = (8.27, 11.69)  # [in] A4
 _ROWS = 24  # teams in the list on the first page
@@ -27,8 +27,8 @@ _ROWS = 24  # teams in the list on the first page
 
 @dataclass(frozen=True)
 class FinalError:
-    """Of a team's object at the end, from its goal: position [m], orientation [rad]; nan where
-    there is no goal or no object."""
+    """Final errors of a team's object: position [m], orientation [rad]; nan without a goal or an
+    object."""
 
     position: float
     orientation: float
@@ -52,8 +52,8 @@ def final_error(contents: BagContents, job: Job) -> FinalError:
 def write_report(bag: Path, out: Path, animate: bool = True) -> dict[str, float]:
     """Write trajectory.png, report.pdf and animation.gif; returns the final errors.
 
-    Where there are several teams, the errors are those of the team that is farthest from its goal
-    (``position_error_m``) and of the one that is turned most (``orientation_error_rad``).
+    With several teams, ``position_error_m`` is that of the team farthest from its goal, and
+    ``orientation_error_rad`` that of the team turned most.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def write_report(bag: Path, out: Path, animate: bool = True) -> dict[str, float]
     """
     contents = load(bag)
     jobs = list(contents.jobs.values())
-    if not jobs:  # nobody owned a job: the scenario's goal is what there is
+    if not jobs:  # no job was recorded: use the goal of the scenario
         item = next(iter(contents.scenario.objects), "")
         jobs = [Job("/", robots=tuple(contents.scenario.robots), object=item)]
     if len(jobs) == 1 and jobs[0].goal is None:
@@ -136,13 +136,11 @@ def _first_page(
 
 
 def _team_page(pdf: Any, contents: BagContents, job: Job, heading: str) -> None:
-    """The map with the team's plan and goal, and the panel of its system below."""
+    """The map with the team's plan and goal, and its reports below."""
     page = plt.figure(figsize=_PAGE)
     layout = page.add_gridspec(2, 1, height_ratios=[1.0, 1.35], hspace=0.16)
     draw_trajectory(page.add_subplot(layout[0]), contents, [job])
-    panel = panel_of(job.system)
-    if panel is not None:
-        panel.draw(page, layout[1], contents, job)
+    draw_report(page, layout[1], contents, job)
     page.suptitle(heading, fontsize=9)
     pdf.savefig(page)
     plt.close(page)

@@ -1,16 +1,16 @@
-"""Whether the suite that a page shows is still there."""
+"""Whether the suite that a page shows is still running."""
 
 from dataclasses import dataclass
 
 SILENCE = 0.6
 """[s] wall time without a frame of poses after which the suite counts as gone."""
 
-_STUCK = 1.0  # [s] wall time in which the viewer must have looked at the graph
+_STUCK = 1.0  # [s] wall time within which the viewer must have checked the graph
 
 
 @dataclass
 class SuiteWatch:
-    """Judges by the poses, by the graph and by the viewer's own pulse.
+    """Decides by the poses, the graph and the viewer's own activity.
 
     Times are readings of one monotonic clock [s], passed in. ``trouble`` may be called from any
     thread.
@@ -24,18 +24,18 @@ class SuiteWatch:
     _published: bool = False
 
     def poses_came(self, now: float) -> None:
-        """A frame of poses has come."""
+        """A frame of poses has arrived."""
         self.poses_at = now
 
     def looked(self, now: float, pose_publishers: int) -> None:
-        """The graph has been looked at: so many publish poses."""
+        """The graph has been checked: number of publishers of poses."""
         self._looked_at = now
         self._published = pose_publishers > 0
 
     def trouble(self, now: float) -> str:
-        """Why the suite counts as gone; empty when it is there.
+        """Why the suite counts as gone; empty if it is running.
 
-        In a pause no poses come; then the graph alone tells.
+        During a pause no poses arrive, so only the graph decides.
         """
         if now - (self.started if self._looked_at is None else self._looked_at) > _STUCK:
             return "the viewer hangs"

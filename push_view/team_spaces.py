@@ -1,4 +1,4 @@
-"""Where the teams of a world are, read from the graph."""
+"""Namespaces of the teams of a world, read from the graph."""
 
 from collections.abc import Sequence
 
@@ -10,8 +10,8 @@ def team_spaces(
 ) -> tuple[str, ...]:
     """Namespaces of the teams of a world, with a slash at the end; that of the viewer first.
 
-    A team is whoever has a ``job_state`` below the world's namespace; one below another world
-    (a namespace with ``poses`` of its own) inside it belongs to that one.
+    A namespace with a ``job_state`` below the world's is a team. A team below a nested world (a
+    namespace with its own ``poses``) belongs to that world.
 
     Parameters
     ----------

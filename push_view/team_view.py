@@ -1,4 +1,4 @@
-"""A team as the viewer sees it: its job, its plan, its panel; and what it is asked for."""
+"""A team in the viewer: its job, plan and panel, and the requests to it."""
 
 import contextlib
 import math
@@ -18,14 +18,14 @@ from push_ros.process import heard
 from push_ros.qos import COMMAND, LATCHED
 from push_ros.validation import InvalidMessage, planar_pose
 from push_view.event_board import EventBoard
-from push_view.panels import LivePanel, panel_of
+from push_view.report_panel import LivePanel
 
 _LOG = 60  # states kept
 _POINTS = 400  # of a path that are sent to a page
 
 
 def stamp_text(message: PoseStamped) -> str:
-    """By which a goal is known again."""
+    """Key by which a goal is recognised."""
     return f"{message.header.stamp.sec}.{message.header.stamp.nanosec:09d}"
 
 
@@ -47,7 +47,7 @@ class TeamView:
         ]
 
     def close(self) -> None:
-        """Leave the graph and the pages."""
+        """Remove the team from the graph and from the pages."""
         for subscription in self._subscriptions:
             self._node.destroy_subscription(subscription)
         self._node.destroy_publisher(self._goals)
@@ -58,13 +58,13 @@ class TeamView:
             self._board.drop(f"{kind} {self.space}")
 
     def look(self) -> None:
-        """See in the graph whether somebody takes goals."""
+        """Check in the graph whether a node accepts goals."""
         self.hears = heard(self._node, self._goals)
 
     def show_panel(self) -> None:
-        """Bring the panel's rows up to date."""
+        """Bring the figures and shapes of its reports up to date."""
         if self._panel is not None:
-            self._put("panel", rows=self._panel.rows())
+            self._put("panel", rows=self._panel.rows(), shapes=self._panel.shapes())
 
     def goal_message(self, pose: Array, nanoseconds: int) -> PoseStamped:
         """A goal ``(3,)``, stamped with a wall time [ns]."""
@@ -78,7 +78,7 @@ class TeamView:
         self._goals.publish(message)
 
     def cancel(self) -> None:
-        """Ask for the end of the job."""
+        """Ask to cancel the job."""
         self._cancel.call_async(Trigger.Request())
 
     def _put(self, kind: str, **data: Any) -> None:
@@ -115,7 +115,7 @@ class TeamView:
             self._put("log", entries=self._log)
 
     def _follow(self, message: JobState) -> None:
-        """Give the page who belongs to the team, and the panel of its system."""
+        """Give the page who belongs to the team, and what its method reports."""
         of = (message.system, tuple(message.robots))
         if of == self._of:
             return
@@ -124,8 +124,7 @@ class TeamView:
         if self._panel is not None:
             self._panel.close()
             self._board.drop(f"panel {self.space}")
-        panel = panel_of(message.system)
-        self._panel = None if panel is None else panel.live(self._node, self.names, of[1])
+        self._panel = LivePanel(self._node, self.names, of[1])
 
     def _on_path(self, message: Path) -> None:
         points = np.array([[p.pose.position.x, p.pose.position.y] for p in message.poses])

@@ -1,8 +1,8 @@
-"""The viewer's side in ROS: what pages are shown, and the goals that they send.
+"""The ROS node of the viewer: data for the pages, and the goals that they send.
 
-A node like any other: it sees poses, map, plans and jobs of all teams in its world's namespace,
-sends goals, and knows neither the bridge nor the ground truth. Which bodies there are it learns
-from the latched topic ``scenario``.
+The node subscribes to poses, map, plans and jobs of all teams in its world's namespace, and sends
+goals. It knows neither the bridge nor the ground truth. It learns the bodies from the latched topic
+``scenario``.
 """
 
 import queue
@@ -38,21 +38,21 @@ from push_view.team_spaces import team_spaces
 from push_view.team_view import TeamView, stamp_text
 
 PERIOD = 0.05
-"""[s] between two frames that pages are shown."""
-_LOOK = 0.25  # [s] between two looks at the graph
+"""[s] between two frames that are sent to pages."""
+_LOOK = 0.25  # [s] between two checks of the graph
 _SEARCH = 1.0  # [s] between two searches for teams
 _Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 class NotTaken(Exception):
-    """A goal or a cancel that is not passed on; the text says why."""
+    """A goal or a cancel request that is not passed on; the text says why."""
 
 
 class ViewerNode(Node):
     """Keeps ``board`` up to date. Methods without an underscore may be called from any thread."""
 
     def __init__(self, scenario: Scenario | None = None) -> None:
-        """scenario: known beforehand; one on the topic replaces it."""
+        """scenario: if known beforehand; one on the topic replaces it."""
         super().__init__("viewer")
         self.names = names_of(self)
         self.board = EventBoard()
@@ -80,7 +80,7 @@ class ViewerNode(Node):
         self._search()
 
     def suite(self) -> dict[str, Any]:
-        """What is wrong with the suite, in a sentence or empty; the same of each team."""
+        """Problems of the suite, in a sentence or empty; and of each team."""
         trouble = self._watch.trouble(time.monotonic())
         with self._lock:
             teams = list(self._teams.values())
@@ -104,9 +104,9 @@ class ViewerNode(Node):
     def send_goal(self, space: str, x: float, y: float, theta: float) -> str:
         """Ask a team for a goal pose [m, m, rad].
 
-        The goal is stamped with wall time, no two alike; returned is the stamp, by which
-        JobState.goal or JobState.refused_goal tells what became of it. space: of the team; empty:
-        the first. Raises NotTaken where nobody would take it.
+        The goal gets a unique wall-time stamp, which is returned. JobState.goal or
+        JobState.refused_goal with that stamp says what became of it. space: of the team; empty:
+        the first. Raises NotTaken if no node would accept it.
         """
         team = self._ready(space)
         with self._lock:
@@ -116,7 +116,7 @@ class ViewerNode(Node):
         return stamp_text(message)
 
     def cancel(self, space: str) -> None:
-        """Ask a team to cancel its job. Raises NotTaken where nobody would hear it."""
+        """Ask a team to cancel its job. Raises NotTaken if no node would receive it."""
         self._requests.put(self._ready(space).cancel)
 
     def _ready(self, space: str) -> TeamView:
@@ -133,7 +133,7 @@ class ViewerNode(Node):
 
     @staticmethod
     def _deaf(team: TeamView) -> str:
-        return "" if team.hears else f"nobody takes goals on {team.names.team('goal_pose')}"
+        return "" if team.hears else f"no node accepts goals on {team.names.team('goal_pose')}"
 
     def _show(self, scenario: Scenario) -> None:
         self._revision += 1
@@ -152,7 +152,7 @@ class ViewerNode(Node):
             self.get_logger().warning(f"refused a scenario: {error}")
             return
         self._show(scenario)
-        for space, team in list(self._teams.items()):  # those of the scenario before
+        for space, team in list(self._teams.items()):  # those of the previous scenario
             if self.count_publishers(team.names.team("job_state")) == 0:
                 team.close()
                 with self._lock:
@@ -161,7 +161,7 @@ class ViewerNode(Node):
 
     def _on_poses(self, data: bytes) -> None:
         self._watch.poses_came(time.monotonic())
-        self._frame = data  # read by _work, not more often than pages are shown it
+        self._frame = data  # read by _work, at most as often as it is sent to pages
 
     def _on_paused(self, message: Bool) -> None:
         self._watch.paused = bool(message.data)
@@ -178,7 +178,7 @@ class ViewerNode(Node):
         self.board.put("map", "map", {"number": self._maps, "extent": [*map(float, grid.extent)]})
 
     def _work(self) -> None:
-        """Carry out what pages asked for; show the newest frame."""
+        """Carry out the requests of pages; send the newest frame."""
         while not self._requests.empty():
             self._requests.get()()
         data, self._frame = self._frame, None
@@ -194,14 +194,14 @@ class ViewerNode(Node):
         self.board.put("poses", "poses", {"revision": self._revision, **self._table.as_json()})
 
     def _look(self) -> None:
-        """See in the graph who is there."""
+        """Look up in the graph who publishes poses."""
         self._watch.looked(time.monotonic(), self.count_publishers(self.names.world("poses")))
         for team in self._teams.values():
             team.look()
             team.show_panel()
 
     def _search(self) -> None:
-        """See in the graph which teams there are."""
+        """Look up the teams in the graph."""
         topics = self.get_topic_names_and_types()
         found = team_spaces(topics, self.names.world_space, self.names.team_space)
         new = [space for space in found if space not in self._teams]

@@ -1,18 +1,19 @@
-"""Which requests the page's server answers: those of its own page, and of nobody else's.
+"""Which requests the page's server answers: only those of its own page.
 
-The rule. Any web page may send requests to this server from the browser of whoever looks at it, and
-may have its own name lead here (DNS rebinding). So a request must name, as its Host, an address
-under which the server is really reached, and must not come from another origin:
+Any web page can make its visitor's browser send requests to this server, and can make its own name
+resolve to this machine (DNS rebinding). Therefore the Host header of a request must be an address
+under which the server is really reached, and the request must not come from another origin:
 
 - ``localhost``, the host that the server was told to bind, and addresses written as numbers
-  (``127.0.0.1``, ``192.168.1.7``, ``[::1]``) are taken: a name of somebody else's cannot be one.
-  Bound to one address, the only numbers are its own and those of the loopback.
-- Bound to all addresses (``0.0.0.0``, ``::``), every address in numbers is taken, and the machine's
-  own host name. No other name is.
-- The port is not looked at: a tunnel may lead here from another one.
-- ``Origin``, where a browser sends it, must be that host and port; ``Sec-Fetch-Site`` must not tell
-  of another site, except for the page itself, which anybody may link to.
-- What moves a robot must also be announced as JSON, which other sites cannot do unasked.
+  (``127.0.0.1``, ``192.168.1.7``, ``[::1]``) are accepted, because a foreign name cannot be one.
+  A server bound to one address accepts only that one and the loopback's.
+- A server bound to all addresses (``0.0.0.0``, ``::``) accepts every numeric address and the host
+  name of the machine, but no other name.
+- The port is ignored, because a tunnel may forward another one.
+- ``Origin``, if a browser sends it, must be that host and port. ``Sec-Fetch-Site`` must not name
+  another site, except for the page itself, to which anybody may link.
+- A request that moves a robot must also have the content type JSON, which other sites cannot send
+  without a preflight request.
 """
 
 import ipaddress
@@ -66,9 +67,9 @@ class WhoMayAsk:
         return name in (*_LOOPBACK, self.bound.lower().strip("[]"))
 
     def refusal(self, headers: Message, *, page: bool = False, acts: bool = False) -> str:
-        """Why a request is not answered; empty when it is.
+        """Why a request is refused; empty if it is answered.
 
-        page: it asks for the page itself. acts: it would move something.
+        page: it asks for the page itself. acts: it would move a robot.
         """
         hosts: Sequence[str] = headers.get_all("Host") or []
         if len(hosts) != 1 or not self.knows(hosts[0]):

@@ -1,17 +1,21 @@
 """Who may touch whom. PyBullet lets two touch when either's group is in the other's mask.
 
-Feet, wheels and casters touch the floor alone; discs touch everything but the floor.
+Feet, wheels and casters touch the floor alone; discs touch everything but the floor. A wall is one
+body for everybody, or one for robots and another one for objects, where their frictions differ.
 """
 
 import pybullet as pb
 
-BODY, FLOOR, DISC, SUPPORT, WALL = 1, 2, 4, 8, 16
+OBJECT, FLOOR, DISC, SUPPORT, WALL, ROBOT, ROBOT_WALL, OBJECT_WALL = (1 << k for k in range(8))
 _MASKS = {
-    BODY: BODY | FLOOR | DISC | WALL,
-    FLOOR: BODY | SUPPORT,
-    DISC: BODY | DISC | WALL,
+    OBJECT: OBJECT | ROBOT | FLOOR | DISC | WALL | OBJECT_WALL,
+    ROBOT: OBJECT | ROBOT | FLOOR | DISC | WALL | ROBOT_WALL,
+    DISC: OBJECT | ROBOT | DISC | WALL | ROBOT_WALL,
+    FLOOR: OBJECT | ROBOT | SUPPORT,
     SUPPORT: FLOOR,
-    WALL: BODY | DISC,
+    WALL: OBJECT | ROBOT | DISC,
+    ROBOT_WALL: ROBOT | DISC,
+    OBJECT_WALL: OBJECT,
 }
 
 

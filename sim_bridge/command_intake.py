@@ -34,11 +34,15 @@ class CommandIntake:
         node: Node,
         names: Names,
         diagnostics: Diagnostics,
-        obeyed: Callable[[float, Rows], None],
+        answered: Callable[[float, Rows], None],
     ) -> None:
-        """obeyed: called with the stamp [s] that a command answers and the robots' rows."""
+        """answered: called with the stamp [s] that a message answers and the robots' rows.
+
+        A command that is refused is an answer too: its robot goes on with the one before, until
+        that is too old.
+        """
         self._node, self._names, self._diagnostics = node, names, diagnostics
-        self._obeyed = obeyed
+        self._answered = answered
         self.now = 0.0
         """[s] Sim time."""
         self.changed = False
@@ -101,6 +105,8 @@ class CommandIntake:
         """Forget all commands."""
         self.gate.restart()
         self._named = np.zeros(len(self.gate.names), dtype=bool)  # on cmd_vels, so far
+        self._commanders: dict[str, frozenset[bytes]] = {}  # of a topic, when looked at last
+        self._spoken = (0.0, 0)  # [s] stamp answered last on cmd_vels, and by how many messages
 
     def commanded(self) -> Mask:
         """``(n,)`` mask of robots that somebody publishes commands for.
@@ -116,9 +122,52 @@ class CommandIntake:
         return own & np.isin(self.gate.names, self._world.names)
 
     def forget(self, rows: Rows) -> None:
-        """Robots that were waited for in vain are not taken for commanded on cmd_vels any more."""
+        """Robots whose commander has left are not taken for commanded on cmd_vels any more."""
         self._named[rows] = False
         self.changed = True
+
+    def abandoned(self, rows: Rows) -> Rows:
+        """Those of some robots of which a commander has left the graph since the last look.
+
+        One that came in its place has not seen the frame that its predecessor was to answer.
+        """
+        changes: dict[str, tuple[bool, bool]] = {}
+        result = []
+        many = self._named if self._named.any() else np.ones_like(self._named)
+        for row in rows:
+            topics = (*self._topics[row], *((self._many,) if many[row] else ()))
+            for topic in topics:
+                if topic not in changes:
+                    changes[topic] = self._look_at(topic)
+            left = any(changes[t][0] for t in topics)
+            if left or not any(changes[t][1] for t in topics):
+                result.append(row)
+        return np.array(result, dtype=np.intp)
+
+    def _look_at(self, topic: str) -> tuple[bool, bool]:
+        """Whether a publisher of a topic has left since the last look; whether there is one."""
+        now = frozenset(
+            bytes(info.endpoint_gid) for info in self._node.get_publishers_info_by_topic(topic)
+        )
+        before = self._commanders.get(topic, now)
+        self._commanders[topic] = now
+        return bool(before - now), bool(now)
+
+    def all_have_spoken(self, stamp: float) -> bool:
+        """Whether everybody who publishes on cmd_vels has answered the frame of a stamp [s]."""
+        answered, count = self._spoken
+        return answered == stamp and count >= int(self._node.count_publishers(self._many))
+
+    def drop_unnamed(self, rows: Rows) -> Rows:
+        """Those of some robots that nobody commands but on cmd_vels, where nobody names them any
+        more. They are stopped, and not taken for commanded until they are named again."""
+        count = self._node.count_publishers
+        alone = [r for r in rows if not any(count(t) > 0 for t in self._topics[r])]
+        result = np.array(alone, dtype=np.intp)
+        if result.size:
+            self.stop(result)
+            self.forget(result)
+        return result
 
     def note_seen(self, names: tuple[str, ...]) -> None:
         """Tell the bodies in the newest frame."""
@@ -153,7 +202,7 @@ class CommandIntake:
                 self._world.command(robot, float(twist[0, 0]), float(twist[0, 2]))
             else:
                 self._world.command_all([robot], admitted.values)
-            self._obeyed(stamp, admitted.rows)
+        self._answered(stamp, self.gate.rows([robot]))
 
     def _on_torques(self, robot: str, message: WheelTorques) -> None:
         if robot not in self.gate.names:
@@ -163,9 +212,18 @@ class CommandIntake:
         admitted = self.gate.admit_torques(robot, torques, stamp, self.now, time.monotonic())
         if self._admitted(self._names.robot(robot, "wheel_torques"), admitted):
             self._world.command_torques(robot, message.left, message.right)
-            self._obeyed(stamp, admitted.rows)
+        self._answered(stamp, self.gate.rows([robot]))
 
     def _on_velocities(self, message: Velocities) -> None:
+        stamp = time_from_ros(message.header.stamp)
+        before, count = self._spoken
+        self._spoken = (stamp, count + 1 if before == stamp else 1)
+        self._take_velocities(message, stamp)
+        rows = self.gate.rows(message.names)
+        blind = self.unseen[self._named[self.unseen]]
+        self._answered(stamp, np.append(rows[rows >= 0], blind))
+
+    def _take_velocities(self, message: Velocities, stamp: float) -> None:
         n = len(message.names)
         columns = [
             np.asarray(c, dtype=np.float64) if len(c) else np.zeros(n)
@@ -180,7 +238,6 @@ class CommandIntake:
             return
         fixed = frame == FRAME
         twists = np.column_stack(columns)
-        stamp = time_from_ros(message.header.stamp)
         admitted = self.gate.admit(message.names, twists, stamp, self.now, time.monotonic(), fixed)
         if self._admitted(self._many, admitted):
             known = self.gate.names
@@ -191,8 +248,6 @@ class CommandIntake:
             if not self._named[admitted.rows].all():
                 self._named[admitted.rows] = True
                 self.changed = True
-            blind = self.unseen[self._named[self.unseen]]
-            self._obeyed(stamp, np.append(admitted.rows, blind) if blind.size else admitted.rows)
 
     def _admitted(self, topic: str, admitted: Admitted) -> bool:
         for reason in admitted.refused:

@@ -33,8 +33,11 @@ class DiscFleet:
         client: int,
         robots: Mapping[str, tuple[RobotSpec, HolonomicDrive, Array]],
         time_step: float,
+        robot_surface: float = 1.0,
     ) -> None:
-        """robots: name to type, drive and start ``(3,)``; time_step: [s]."""
+        """robots: name to type, drive and start ``(3,)``; time_step: [s]; robot_surface: see
+        ``robot_surface``."""
+        self._surface = robot_surface
         self._client, self._dt = client, time_step
         self.names = tuple(robots)
         specs = [spec for spec, _, _ in robots.values()]
@@ -71,7 +74,7 @@ class DiscFleet:
         """Made where it starts: a thousand in one place would all be neighbours."""
         client = self._client
         body: int = pb.createMultiBody(mass, shape, basePosition=start, physicsClientId=client)
-        pb.changeDynamics(body, -1, lateralFriction=1.0, physicsClientId=client)
+        pb.changeDynamics(body, -1, lateralFriction=self._surface, physicsClientId=client)
         pb.changeDynamics(
             body,
             -1,

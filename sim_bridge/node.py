@@ -32,6 +32,9 @@ from sim_bridge.world import World
 from sim_bridge.world_publishers import WorldPublishers
 from sim_bridge.worlds import steps_of, world_kind
 
+_PATIENT = 0.2  # [s] wall time without an answer until the bridge looks who is in the graph
+_SHOWN = 5  # names in a warning
+
 
 class BridgeNode(Node):
     """Steps a world at a pace, moves its robots as they are commanded, publishes what is seen."""
@@ -69,15 +72,16 @@ class BridgeNode(Node):
         self.period = 1.0 / self._rate
         self._decimation = max(1, round(self._rate / self.settings.tf_rate))
         self._diagnostics = Diagnostics(self, self._names, self._state)
-        self.outputs = WorldPublishers(self, self._names, self._diagnostics)
-        self._intake = CommandIntake(self, self._names, self._diagnostics, self._on_obeyed)
+        self.outputs = WorldPublishers(self, self._names, self._diagnostics, self.settings.lockstep)
+        self._intake = CommandIntake(self, self._names, self._diagnostics, self._on_answered)
         self._pace = RealTime(self.period, self.settings.real_time_factor)
         self._seed = self.settings.seed
         self.world: World | None = None
         self.running = False
         self._paused = False
         self._autostart = autostart
-        self.lockstep_timeouts = 0
+        self.unanswered = 0
+        """Ticks in lockstep that went on without an answer, because a commander had left."""
         self._build()
         service, at = self.create_service, self._names.world
         service(Reset, at("bridge/reset"), self._on_reset)
@@ -99,7 +103,7 @@ class BridgeNode(Node):
         self._footing = Footing(s)
         self._disturbances = Disturbances(s.events, self._rate, self._footing)
         self.outputs.scenario(s)
-        late = self._capture.delay * self.period
+        late = self._capture.longest_latency
         wall = math.inf if self.settings.lockstep else self.settings.command_timeout_wall
         types = {robot: spec for robot, (spec, _) in s.robots.items()}
         self._intake.connect(self.world, types, self.settings.command_timeout + late, wall)
@@ -120,12 +124,22 @@ class BridgeNode(Node):
         """[s] sim time."""
         return float(self.tick / self._rate)
 
+    @property
+    def applied_latency(self) -> tuple[float, float]:
+        """[s] Mean and standard deviation of the latency of the poses since the start."""
+        return self._capture.applied_latency
+
     def commanded(self) -> list[str]:
         """Robots that somebody publishes commands for."""
         return self._named(np.flatnonzero(self._intake.commanded()))
 
     def _named(self, rows: Rows) -> list[str]:
         return [self._intake.gate.names[row] for row in rows]
+
+    def _listed(self, rows: Rows) -> str:
+        """Robots in words, for a message."""
+        more = f" and {len(rows) - _SHOWN} more" if len(rows) > _SHOWN else ""
+        return ", ".join(self._named(rows[:_SHOWN])) + more
 
     def heard_by(self, count: int) -> bool:
         """Whether so many listen to the poses."""
@@ -160,33 +174,45 @@ class BridgeNode(Node):
             for _ in range(self._pace.due(now)):
                 self._tick()
             return
-        late = self._lockstep.overdue(now, self.settings.lockstep_timeout)
-        if late.size or self._lockstep.ready:
-            if late.size:
-                self.lockstep_timeouts += 1
-                names = ", ".join(self._named(late))
-                self.get_logger().warning(f"no answer to tick {self.tick} from {names}")
-                self._intake.stop(late)
-                self._intake.forget(late)
-                self._commanded = self._intake.commanded()
+        if not self._lockstep.ready and self._lockstep.waited(now) > _PATIENT:
+            self._release_abandoned()
+        if self._lockstep.ready:
             self._advance()
+        elif self._lockstep.due_to_tell(now, self.settings.lockstep_warning):
+            names = self._listed(self._lockstep.waiting)
+            self.get_logger().warning(f"no answer to tick {self.tick} from {names}; waiting on")
+
+    def _release_abandoned(self) -> None:
+        """Do not wait for robots whose commander has left the graph; they are stopped."""
+        rows = self._intake.abandoned(self._lockstep.waiting)
+        if not rows.size:
+            return
+        self.unanswered += 1
+        text = f"whoever commanded {self._listed(rows)} has left; stopped at tick {self.tick}"
+        self.get_logger().warning(text)
+        self._intake.stop(rows)
+        self._intake.forget(rows)
+        self._commanded = self._intake.commanded()
+        self._lockstep.release(rows)
 
     def _advance(self) -> None:
         """Lockstep: tick until somebody must answer."""
         while self.running and not self._paused:
-            stamp = self._tick()
-            if stamp is not None:
-                self._lockstep.expect(stamp, self._commanded, time.monotonic())
+            frame = self._tick()
+            if frame is not None:
+                self._lockstep.expect(frame, self._commanded, time.monotonic())
             if not self._lockstep.ready or not self._commanded.any():
                 return
 
-    def _on_obeyed(self, stamp: float, rows: Rows) -> None:
-        """Robots were commanded in answer to the poses of a stamp [s]."""
+    def _on_answered(self, stamp: float, rows: Rows) -> None:
+        """Somebody answered the poses of a stamp [s] for robots."""
         if not (self.settings.lockstep and self.running):
             return
         if self._intake.changed or not self._commanded[rows].all():
             self._recount()
-        self._lockstep.answer(round(stamp * self._rate), rows)
+        newest = self._lockstep.answer(_number_of(stamp), rows)
+        if newest and not self._lockstep.ready and self._intake.all_have_spoken(stamp):
+            self._lockstep.release(self._intake.drop_unnamed(self._lockstep.waiting))
         if self._lockstep.ready:  # while paused it is kept for later
             self._advance()
 
@@ -196,7 +222,7 @@ class BridgeNode(Node):
         self._lockstep.release(np.flatnonzero(~self._commanded))
 
     def _tick(self) -> int | None:
-        """Step the physics by one control tick and publish; the stamp of the frame published."""
+        """Step the physics by one control tick and publish; the number of the frame published."""
         assert self.world is not None
         world, outputs = self.world, self.outputs
         for robot in self._named(self._intake.watch(self.time)):
@@ -218,7 +244,7 @@ class BridgeNode(Node):
         outputs.seen(frame, measured)
         if self.tick % self._decimation == 0:
             outputs.look(self._scenario, frame, self.tick // self._decimation, measured)
-        return frame.stamp
+        return _number_of(measured)
 
     def _on_reset(self, request: Any, response: Any) -> Any:
         assert self.world is not None
@@ -263,7 +289,7 @@ class BridgeNode(Node):
         return {
             "sim time": f"{self.time:.2f}",
             "scenario": self._scenario.name,
-            "lockstep timeouts": self.lockstep_timeouts,
+            "unanswered ticks": self.unanswered,
             "stalls": self._pace.stalls,
             "paused": self._paused,
         }
@@ -276,6 +302,11 @@ class BridgeNode(Node):
             self.world.close()
             self.world = None
         super().destroy_node()
+
+
+def _number_of(stamp: float) -> int:
+    """Of the frame of a stamp [s]: its nanoseconds, as messages carry them."""
+    return round(1e9 * stamp)
 
 
 def main() -> int:

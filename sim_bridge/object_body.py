@@ -16,7 +16,7 @@ from push_model.convex_parts import convex_parts
 from push_model.limit_surface import GRAVITY, uniform_pressure_radius
 from push_model.outlines import inset
 from push_model.specs import ObjectSpec
-from sim_bridge.collision_groups import BODY, SUPPORT, set_group
+from sim_bridge.collision_groups import OBJECT, SUPPORT, set_group
 
 _CLEARANCE = 0.003  # [m] of the body above the floor
 _FOOT_RADIUS = 0.005  # [m]
@@ -41,7 +41,10 @@ class Feet:
 class ObjectBody:
     """One object in one PyBullet world. The frame of its base is at the centre of mass."""
 
-    def __init__(self, client: int, spec: ObjectSpec, feet: Feet, start: Array) -> None:
+    def __init__(
+        self, client: int, spec: ObjectSpec, feet: Feet, start: Array, robot_surface: float = 1.0
+    ) -> None:
+        """start ``(3,)`` pose; robot_surface: see ``robot_surface``."""
         self.spec = spec
         self._client = client
         self.centre = spec.com
@@ -79,7 +82,7 @@ class ObjectBody:
         inertia = self._base_inertia(n, link_mass, radius)
         for link in range(-1, links):
             is_foot = 0 <= link < n
-            friction = spec.floor_friction if is_foot else spec.contact_friction
+            friction = spec.floor_friction if is_foot else spec.contact_friction / robot_surface
             # Friction and damping in one call leave the friction of a link unset.
             pb.changeDynamics(self.body, link, lateralFriction=friction, physicsClientId=client)
             pb.changeDynamics(
@@ -100,7 +103,7 @@ class ObjectBody:
                     contactDamping=feet.damping,
                     physicsClientId=client,
                 )
-            set_group(client, self.body, link, SUPPORT if is_foot else BODY)
+            set_group(client, self.body, link, SUPPORT if is_foot else OBJECT)
             applied = pb.getDynamicsInfo(self.body, link, physicsClientId=client)[1]
             if abs(applied - friction) > 1e-9:
                 raise RuntimeError(f"friction {friction} was not applied to link {link}: {applied}")

@@ -8,38 +8,58 @@ from push_model.arrays import Mask, Rows
 
 
 class Lockstep:
-    """Waits for the answer of every commanded robot to the newest frame. Robots are rows."""
+    """Waits for the answer of every commanded robot to the newest frame. Robots are rows.
+
+    It waits for any time: only an answer, or ``release``, ends the wait for a robot.
+    """
 
     def __init__(self, robots: int) -> None:
         self._waiting = np.zeros(robots, dtype=bool)
         self._frame: int | None = None
         self._since = 0.0
+        self._told = False
         self.ready = True
         """Whether nobody is waited for."""
 
     def expect(self, frame: int, robots: Mask, now: float) -> None:
-        """A frame (tick number) was published at monotonic time now [s]; robots must answer it.
+        """A frame, by its number, was published at monotonic time now [s]; robots must answer it.
 
         robots: ``(n,)`` mask.
         """
-        self._frame, self._since = frame, now
+        self._frame, self._since, self._told = frame, now, False
         self._waiting = robots.copy()
         self.ready = not robots.any()
 
-    def answer(self, frame: int, rows: Rows) -> None:
-        """Robots answered a frame."""
-        if frame == self._frame:
-            self.release(rows)
+    def answer(self, frame: int, rows: Rows) -> bool:
+        """Robots answered a frame; whether it is the newest one."""
+        if frame != self._frame:
+            return False
+        self.release(rows)
+        return True
 
     def release(self, rows: Rows) -> None:
         """Wait no longer for robots."""
         self._waiting[rows] = False
         self.ready = not self._waiting.any()
 
-    def overdue(self, now: float, limit: float) -> Rows:
-        """``(k,)`` rows of robots that have not answered for longer than limit [s]."""
-        late = now - self._since > limit
-        return np.flatnonzero(self._waiting) if late else np.zeros(0, dtype=np.intp)
+    @property
+    def waiting(self) -> Rows:
+        """``(k,)`` rows of robots that have not answered."""
+        return np.flatnonzero(self._waiting)
+
+    def waited(self, now: float) -> float:
+        """[s] since the newest frame."""
+        return now - self._since
+
+    def due_to_tell(self, now: float, limit: float) -> bool:
+        """Whether robots have been waited for longer than limit [s]; true once a frame.
+
+        It is for a warning only: in lockstep no wall clock decides anything.
+        """
+        if self.ready or self._told or self.waited(now) <= limit:
+            return False
+        self._told = True
+        return True
 
 
 class RealTime:

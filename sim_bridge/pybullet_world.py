@@ -19,6 +19,7 @@ from sim_bridge.contact_sums import ContactSums
 from sim_bridge.disc_fleet import DiscFleet
 from sim_bridge.object_body import Feet, ObjectBody
 from sim_bridge.robot_body import RobotBody
+from sim_bridge.robot_surface import robot_surface
 from sim_bridge.settings import PhysicsSettings
 from sim_bridge.speed_body import SpeedBody
 from sim_bridge.torque_body import TorqueBody
@@ -30,12 +31,12 @@ _AWAY = 1000.0  # [m] where removed bodies are kept
 _AWAY_GAP = 5.0  # [m] between them
 
 
-def _wheeled(client: int, spec: RobotSpec, start: Array) -> RobotBody:
-    """The body of a robot with wheels, by its drive."""
+def _wheeled(client: int, spec: RobotSpec, start: Array, surface: float) -> RobotBody:
+    """The body of a robot with wheels, by its drive. surface: see ``robot_surface``."""
     if isinstance(spec.drive, SpeedDrive):
-        return SpeedBody(client, spec, spec.drive, start)
+        return SpeedBody(client, spec, spec.drive, start, surface)
     if isinstance(spec.drive, TorqueDrive):
-        return TorqueBody(client, spec, spec.drive, start)
+        return TorqueBody(client, spec, spec.drive, start, surface)
     raise SettingsError(f"no body in PyBullet for a drive '{spec.drive.kind}'")
 
 
@@ -64,19 +65,21 @@ class PyBulletWorld:
             deterministicOverlappingPairs=1,
             physicsClientId=client,  # enableConeFriction=1 would switch the cone off
         )
-        walls = Walls(client, environment)
+        surface = robot_surface([robot for robot, _ in robots.values()])
+        walls = Walls(client, environment, surface)
         self._wheeled: dict[str, RobotBody] = {}
         discs: dict[str, tuple[RobotSpec, HolonomicDrive, Array]] = {}
         for name, (robot, start) in robots.items():
             if isinstance(robot.drive, HolonomicDrive):
                 discs[name] = (robot, robot.drive, start)
             else:
-                self._wheeled[name] = _wheeled(client, robot, start)
-        self._discs = DiscFleet(client, discs, self.physics.time_step)
+                self._wheeled[name] = _wheeled(client, robot, start, surface)
+        self._discs = DiscFleet(client, discs, self.physics.time_step, surface)
         self._disc_rows = {name: row for row, name in enumerate(self._discs.names)}
         feet = Feet(self.physics.foot_stiffness, self.physics.foot_damping)
         self._objects = {
-            name: ObjectBody(client, item, feet, start) for name, (item, start) in objects.items()
+            name: ObjectBody(client, item, feet, start, surface)
+            for name, (item, start) in objects.items()
         }
         self._robots = tuple(robots)
         self._ids = {

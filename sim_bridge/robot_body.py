@@ -9,7 +9,7 @@ import pybullet as pb
 
 from push_model.arrays import Array
 from push_model.specs import RobotSpec
-from sim_bridge.collision_groups import BODY, SUPPORT, set_group
+from sim_bridge.collision_groups import ROBOT, SUPPORT, set_group
 from sim_bridge.wheeled_urdf import COM_HEIGHT, Wheels, wheeled_urdf
 from sim_bridge.world import WheelState
 
@@ -50,8 +50,15 @@ class RobotBody(Protocol):
 class WheeledBody:
     """Loading, placing and reading of a robot with two wheels."""
 
-    def __init__(self, client: int, spec: RobotSpec, wheels: Wheels, friction: float) -> None:
-        """friction: of the wheels on the floor."""
+    def __init__(
+        self,
+        client: int,
+        spec: RobotSpec,
+        wheels: Wheels,
+        friction: float,
+        robot_surface: float = 1.0,
+    ) -> None:
+        """friction: of the wheels on the floor; robot_surface: see ``robot_surface``."""
         self._client, self._radius = client, wheels.radius
         self.centre = (spec.com_ahead, 0.0)
         with tempfile.TemporaryDirectory() as folder:
@@ -64,7 +71,7 @@ class WheeledBody:
                 flags=pb.URDF_USE_IMPLICIT_CYLINDER,
             )
         for link in range(-1, pb.getNumJoints(self.body, physicsClientId=client)):
-            mu = 1.0 if link == _BASE else friction if link in WHEELS else 0.0
+            mu = robot_surface if link == _BASE else friction if link in WHEELS else 0.0
             pb.changeDynamics(self.body, link, lateralFriction=mu, physicsClientId=client)
             pb.changeDynamics(
                 self.body,
@@ -77,7 +84,7 @@ class WheeledBody:
                 jointDamping=0.0,
                 physicsClientId=client,
             )
-            set_group(client, self.body, link, BODY if link == _BASE else SUPPORT)
+            set_group(client, self.body, link, ROBOT if link == _BASE else SUPPORT)
 
     def set_inertia(self, link: int, diagonal: list[float]) -> None:
         """Of a link (-1: the body), [kg m^2] about its axes; else PyBullet takes its shape's."""

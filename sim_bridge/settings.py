@@ -8,24 +8,58 @@ class PhysicsSettings:
     """PyBullet's step and solver."""
 
     time_step: float = bounded(
-        1e-3, low=1e-4, high=1e-2, doc="[s] longest physics step; a tick is a whole number of them"
+        1e-3,
+        low=1e-4,
+        high=1e-2,
+        doc="Longest physics step (s). A control tick is a whole number of steps.",
     )
-    solver_iterations: int = bounded(100, low=5, high=1000, doc="constraint solver iterations")
-    foot_stiffness: float = bounded(2000.0, low=10.0, high=1e6, doc="[N/m] of an object's foot")
-    foot_damping: float = bounded(20.0, low=0.0, high=1e4, doc="[Ns/m] of an object's foot")
+    solver_iterations: int = bounded(
+        100, low=5, high=1000, doc="Iterations of the constraint solver in one physics step."
+    )
+    foot_stiffness: float = bounded(
+        2000.0, low=10.0, high=1e6, doc="Contact stiffness of one foot of an object (N/m)."
+    )
+    foot_damping: float = bounded(
+        20.0, low=0.0, high=1e4, doc="Contact damping of one foot of an object (N s/m)."
+    )
 
 
 @settings
 class MotionCaptureSettings:
     """The pose stream."""
 
-    rate: float = bounded(100.0, low=1.0, high=1000.0, doc="[Hz]; one control tick per frame")
-    position_noise: float = bounded(0.0, low=0.0, high=0.1, doc="[m] standard deviation per axis")
-    orientation_noise: float = bounded(0.0, low=0.0, high=1.0, doc="[rad] standard deviation")
-    latency: float = bounded(
-        0.0, low=0.0, high=1.0, doc="[s] a frame comes out at the first tick that is so much later"
+    rate: float = bounded(
+        100.0, low=1.0, high=1000.0, doc="Frames per second; one control tick per frame (Hz)."
     )
-    dropout: float = bounded(0.0, low=0.0, high=1.0, doc="probability that a frame misses a body")
+    position_noise: float = bounded(
+        0.0,
+        low=0.0,
+        high=0.1,
+        doc="Standard deviation of the white noise on x and on y of every pose (m).",
+    )
+    orientation_noise: float = bounded(
+        0.0,
+        low=0.0,
+        high=1.0,
+        doc="Standard deviation of the white noise on the orientation of every pose (rad).",
+    )
+    latency: float = bounded(
+        0.0,
+        low=0.0,
+        high=1.0,
+        doc="Mean time from the instant that a frame shows to its publication (s). Any value is "
+        "kept exactly: the instant may lie between two ticks of the simulation.",
+    )
+    latency_jitter: float = bounded(
+        0.0,
+        low=0.0,
+        high=0.5,
+        doc="Half width of the uniform distribution of the latency about its mean (s). A frame "
+        "never overtakes an earlier one.",
+    )
+    dropout: float = bounded(
+        0.0, low=0.0, high=1.0, doc="Probability that a frame misses a body (dimensionless)."
+    )
 
 
 @settings
@@ -34,16 +68,44 @@ class BridgeSettings:
 
     world: str = "pybullet"
     lockstep: bool = False
-    real_time_factor: float = bounded(1.0, low=0.01, high=100.0, doc="pace when not in lockstep")
-    command_timeout: float = bounded(0.2, low=0.01, high=5.0, doc="[s] sim time, then wheels stop")
-    command_timeout_wall: float = bounded(
-        0.5, low=0.05, high=10.0, doc="[s] wall time without a command, then wheels stop"
+    real_time_factor: float = bounded(
+        1.0,
+        low=0.01,
+        high=100.0,
+        doc="Simulated time per wall time when the world is not in lockstep (dimensionless).",
     )
-    lockstep_timeout: float = bounded(
-        2.0, low=0.05, high=60.0, doc="[s] wall time to wait for a tick's answers"
+    command_timeout: float = bounded(
+        0.2,
+        low=0.01,
+        high=5.0,
+        doc="Simulated time without a fresh command after which a robot is stopped (s). The mean "
+        "latency of the poses is added.",
+    )
+    command_timeout_wall: float = bounded(
+        0.5,
+        low=0.05,
+        high=10.0,
+        doc="Wall time without a command after which a robot is stopped (s). Unused in lockstep.",
+    )
+    lockstep_warning: float = bounded(
+        2.0,
+        low=0.05,
+        high=600.0,
+        doc="Wall time without an answer to a tick in lockstep after which a warning names the "
+        "robots that are waited for (s). The world waits on.",
     )
     discovery_time: float = bounded(
-        0.5, low=0.0, high=10.0, doc="[s] wall time to look for another bridge at start"
+        0.5,
+        low=0.0,
+        high=10.0,
+        doc="Wall time to look for another bridge before this one starts (s).",
     )
-    tf_rate: float = bounded(25.0, low=0.1, high=1000.0, doc="[Hz] sim time, of /tf and markers")
-    seed: int = bounded(1, low=0, high=2**62, doc="of the motion-capture noise")
+    tf_rate: float = bounded(
+        25.0,
+        low=0.1,
+        high=1000.0,
+        doc="Transforms on /tf per second of simulated time (Hz). Markers come at a fifth of it.",
+    )
+    seed: int = bounded(
+        1, low=0, high=2**62, doc="Seed of the noise, drop-outs and latency of the poses."
+    )

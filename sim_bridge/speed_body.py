@@ -14,11 +14,19 @@ from sim_bridge.wheeled_urdf import Wheels
 class SpeedBody(WheeledBody):
     """Wheels with a speed servo of bounded torque."""
 
-    def __init__(self, client: int, spec: RobotSpec, drive: SpeedDrive, start: Array) -> None:
+    def __init__(
+        self,
+        client: int,
+        spec: RobotSpec,
+        drive: SpeedDrive,
+        start: Array,
+        robot_surface: float = 1.0,
+    ) -> None:
+        """start ``(3,)`` pose; robot_surface: see ``robot_surface``."""
         self.drive = drive
         roll = drive.wheel_mass * drive.wheel_radius**2 / 2.0
         wheels = Wheels(drive.wheel_radius, drive.half_track, drive.wheel_mass, (roll, roll))
-        super().__init__(client, spec, wheels, drive.wheel_friction)
+        super().__init__(client, spec, wheels, drive.wheel_friction, robot_surface)
         if drive.wheel_inertia > 0.0:
             for wheel in WHEELS:
                 self.set_inertia(wheel, [roll, drive.wheel_inertia, roll])

@@ -17,13 +17,21 @@ from sim_bridge.world import WheelState
 class TorqueBody(WheeledBody):
     """Wheels under torques, or under a speed servo: as the last command was."""
 
-    def __init__(self, client: int, spec: RobotSpec, drive: TorqueDrive, start: Array) -> None:
+    def __init__(
+        self,
+        client: int,
+        spec: RobotSpec,
+        drive: TorqueDrive,
+        start: Array,
+        robot_surface: float = 1.0,
+    ) -> None:
+        """start ``(3,)`` pose; robot_surface: see ``robot_surface``."""
         self.drive = drive
         across = drive.wheel_mass * drive.wheel_radius**2 / 4.0
         wheels = Wheels(
             drive.wheel_radius, drive.half_track, drive.wheel_mass, (drive.wheel_inertia, across)
         )
-        super().__init__(client, spec, wheels, drive.wheel_friction)
+        super().__init__(client, spec, wheels, drive.wheel_friction, robot_surface)
         self._set_inertia(spec, wheels)
         self._torques: tuple[float, float] | None = None
         self._applied = (0.0, 0.0)

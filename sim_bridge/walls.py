@@ -7,7 +7,7 @@ import pybullet as pb
 
 from push_model.occupancy import MapSpec
 from push_model.specs import EnvironmentSpec
-from sim_bridge.collision_groups import FLOOR, WALL, set_group
+from sim_bridge.collision_groups import FLOOR, OBJECT_WALL, ROBOT_WALL, WALL, set_group
 
 _THICKNESS = 0.1  # [m] of the walls about an arena
 
@@ -19,8 +19,11 @@ class Walls:
     names: PyBullet id to name, of the floor too.
     """
 
-    def __init__(self, client: int, environment: EnvironmentSpec | MapSpec) -> None:
-        self._client = client
+    def __init__(
+        self, client: int, environment: EnvironmentSpec | MapSpec, robot_surface: float = 1.0
+    ) -> None:
+        """robot_surface: see ``robot_surface``."""
+        self._client, self._surface = client, robot_surface
         self._height, self._friction = environment.wall_height, environment.wall_friction
         self.names: dict[int, str] = {}
         plane = pb.createCollisionShape(pb.GEOM_PLANE, physicsClientId=client)
@@ -50,8 +53,12 @@ class Walls:
         return body
 
     def _wall(self, name: str, shape: int, x: float, y: float, z: float, yaw: float) -> None:
-        body = self._static(name, shape, x, y, z, yaw, self._friction)
-        set_group(self._client, body, -1, WALL)
+        copies = {WALL: 1.0}
+        if self._surface != 1.0:
+            copies = {ROBOT_WALL: 1.0 / self._surface, OBJECT_WALL: self._surface}
+        for group, factor in copies.items():
+            body = self._static(name, shape, x, y, z, yaw, factor * self._friction)
+            set_group(self._client, body, -1, group)
 
     def _build_boxes(self, boxes: Sequence[tuple[float, ...]]) -> None:
         """Boxes of x, y, length, width, yaw, as high as walls are."""

@@ -35,9 +35,10 @@ _MARKERS = 5
 
 
 class WorldPublishers:
-    """Clock, poses, ground truth, contacts, wheels, tf, markers, map, scenario."""
+    """Clock, pace, poses, ground truth, contacts, wheels, tf, markers, map, scenario."""
 
-    def __init__(self, node: Node, names: Names, diagnostics: Diagnostics) -> None:
+    def __init__(self, node: Node, names: Names, diagnostics: Diagnostics, lockstep: bool) -> None:
+        """lockstep: whether the world waits for its controllers; published for all nodes."""
         self._node, self._names = node, names
         name, make = names.world, node.create_publisher
         self._clock = make(Clock, name("clock"), CLOCK)
@@ -56,6 +57,8 @@ class WorldPublishers:
         self._scenario = make(String, name("scenario"), LATCHED)
         self._paused = make(Bool, name("paused"), LATCHED)
         self.paused(False)
+        self._lockstep = make(Bool, name("lockstep"), LATCHED)
+        self._lockstep.publish(Bool(data=lockstep))
         self._joints: dict[str, Any] = {}
         self._heard: Sequence[str] = ()
 

@@ -2,8 +2,8 @@
 
 It answers every frame of the pose stream with its robot's velocity and broadcasts its state to its
 neighbours. From the stream it takes its own pose, the object's, and those of bodies outside its
-swarm. The other robots' poses come from their messages. Messages from beyond the radius are ignored,
-and a set fraction of the rest is dropped.
+swarm. The other robots' poses come from their messages. Messages from beyond the radius are
+ignored, and a set fraction of the rest is dropped.
 """
 
 import sys
@@ -14,23 +14,27 @@ from geometry_msgs.msg import TwistStamped
 from rclpy.node import Node
 from std_msgs.msg import Header
 
-from push_estimation.pose_gate import Stamp
+from push_estimation.pose_gate import PoseGateSettings, Stamp
+from push_job.method import Arena, Unsuited
 from push_model import se2
 from push_model.arrays import Array
+from push_model.belief import Belief
 from push_model.occupancy import OccupancyGrid as Grid
 from push_msgs.msg import SwarmAgentState, SwarmTarget
+from push_ros.belief_feed import BeliefFeed
 from push_ros.conversions import time_from_ros
 from push_ros.diagnostics import Diagnostics
 from push_ros.map_feed import MapFeed
 from push_ros.names import names_of
+from push_ros.parameters import declare_settings
 from push_ros.pose_feed import Frame, PoseFeed
 from push_ros.process import run_node
 from push_ros.qos import CHATTER, COMMAND
 from push_ros.validation import InvalidMessage
 from push_scenario.scenario import Scenario, load_scenario
-from swarm_push.agent import Agent, AgentState
-from swarm_push.parameters import declare_swarm
+from swarm_push.agent import Agent, AgentSettings, AgentState
 from swarm_push.swarm_messages import agent_state_from_ros, agent_state_to_ros, target_from_ros
+from swarm_push.swarm_method import SECTIONS, swarm_job
 
 
 class SwarmAgentNode(Node):
@@ -55,7 +59,8 @@ class SwarmAgentNode(Node):
         given = self.declare_parameter("robots", list(robots) or [""]).value
         self._team = frozenset(r for r in given if r) or frozenset(scenario.robots)
         self.object, self._item = scenario.object(str(self.declare_parameter("object", item).value))
-        self.settings = declare_swarm(self, scenario)
+        self.settings, gate = self._declare(scenario)
+        self._behaviour: AgentSettings = self.settings["agents"]
         self._others = {
             k: r for k, r in scenario.radii.items() if k not in self._team and k != self.object
         }
@@ -79,25 +84,43 @@ class SwarmAgentNode(Node):
             events = self._diagnostics.subscription_events(topic)
             self.create_subscription(kind, topic, handler, qos, event_callbacks=events)
         MapFeed(self, names, self._diagnostics, self._take_map)
+        BeliefFeed(self, names, scenario, self._diagnostics, self._take_up)
         self._poses = PoseFeed(
             self,
             names,
-            self.settings.poses,
+            gate,
             [self.robot, self.object, *self._others],
             self._diagnostics,
             self._on_frame,
         )
 
+    def _declare(self, scenario: Scenario) -> tuple[dict[str, Any], PoseGateSettings]:
+        values = dict(scenario.parameters.get("swarm", {}))
+        classes = {**SECTIONS, "poses": PoseGateSettings}
+        sections = {k: values.pop(k, {}) for k in classes if k}
+        made: dict[str, Any] = {
+            k: declare_settings(self, cls, sections[k], k, f"swarm.{k}")
+            for k, cls in classes.items()
+            if k
+        }
+        made[""] = declare_settings(self, SECTIONS[""], values, where="swarm")
+        return made, made.pop("poses")
+
     # What comes
 
     def _take_map(self, grid: Grid) -> None:
         self.agent = None
-        job = self.settings.make_job(grid, self._item, self._spec)
-        if isinstance(job, str):
-            self._why_not = job
-            return
-        job.warm_up()
-        self.agent = Agent(self.robot, job, self.settings.agents)
+        arena = Arena(grid, {self.robot: self._spec}, self.object, self._item, self.settings)
+        try:
+            self.agent = Agent(self.robot, swarm_job(arena), self._behaviour)
+        except Unsuited as error:
+            self._why_not = str(error)
+
+    def _take_up(self, belief: Belief) -> None:
+        """Go on with what is believed of the object now."""
+        self._item = belief.object(self.object)
+        if self.agent is not None:
+            self.agent.job.believe(self._item)
 
     def _on_target(self, message: SwarmTarget) -> None:
         try:
@@ -146,7 +169,7 @@ class SwarmAgentNode(Node):
         self._messages = [w for w in self._messages if w.time >= now]
         for message in heard:
             agent.hear(message)
-        agent.pursue(self._target if now - self._told < self.settings.agents.silence else None)
+        agent.pursue(self._target if now - self._told < self._behaviour.silence else None)
         others = self._poses.discs(self._others)
         twist, message = agent.step(now, self._item.mass_pose(item), own, others)
         self._said.publish(agent_state_to_ros(stamp, message))

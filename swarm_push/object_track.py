@@ -81,7 +81,8 @@ class TrackSettings:
 
 class ObjectTrack:
     """For one object and robots of one radius [m]. under_way: whether there is a way; searching:
-    whether one is looked for; holds: whether the object is to stay where it is until there is."""
+    whether one is looked for; holds: whether the object is to stay where it is until there is.
+    field: distances of the map."""
 
     def __init__(
         self,
@@ -93,7 +94,9 @@ class ObjectTrack:
         """outline: ``(k, 2)`` [m] about the centre of mass."""
         warm_up()
         self.settings = settings
-        self._finder, self._diameter = WayFinder(FreeSpace(grid), outline, 0.0), 2.0 * radius
+        space = FreeSpace(grid)
+        self.field = space.field
+        self._finder, self._diameter = WayFinder(space, outline, 0.0), 2.0 * radius
         self._lever = float(np.hypot(*outline.T).max())
         self._target = np.zeros(3)
         self._pieces: list[tuple[Array, Array]] = []

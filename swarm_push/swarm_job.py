@@ -5,6 +5,7 @@ Robots may come, leave and die meanwhile: whoever is seen and does as it is told
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -85,7 +86,15 @@ class SwarmJob:
             self._walls = None if walls.open else walls
             track = track or TrackSettings()
             self.track = ObjectTrack(walls.space.field, item.geometry.outline, self._radius, track)
-        self._law = make_law(laws or LawSections(), region, item, self._radius, self._speed, walls)
+        self._make_law = partial(
+            make_law,
+            laws or LawSections(),
+            region,
+            radius=self._radius,
+            speed=self._speed,
+            walls=walls,
+        )
+        self._law = self._make_law(item)
         self._outline = item.geometry.outline
         self._lever = float(np.hypot(*self._outline.T).max())
         self.state, self.reason, self.error = JobPhase.IDLE, "waiting for a goal", JobError.NONE
@@ -158,6 +167,18 @@ class SwarmJob:
     def revive(self) -> None:
         """Believe in all robots again: a new job, a reset world, or somebody saw to them."""
         self._liveness.revive()
+
+    def believe(self, item: ObjectSpec) -> None:
+        """Go on with another object than before: the law is made anew for it, and the way where
+        its outline is another one."""
+        outline = item.geometry.outline
+        if not np.array_equal(outline, self._outline):
+            self._outline = outline
+            self._lever = float(np.hypot(*outline.T).max())
+            if self.track is not None:
+                track = self.track
+                self.track = ObjectTrack(track.field, outline, self._radius, track.settings)
+        self._law = self._make_law(item)
 
     def errors(self, pose: Array) -> tuple[float, float]:
         """[m], [rad] from the target that is pursued; no heading counts as none off."""

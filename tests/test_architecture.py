@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 FLOORS = [
     {"push_model", "push_msgs", "tf2_msgs"},
-    {"push_scenario", "push_estimation", "push_qp"},
+    {"push_job", "push_scenario", "push_estimation", "push_qp"},
     {"push_ros"},
     {
         "push_planner",
@@ -33,7 +33,7 @@ ROS = {"rclpy", "push_ros", "push_msgs", "tf2_msgs", "ament_index_python"} | {
     f"{kind}_msgs"
     for kind in ("std", "geometry", "nav", "sensor", "visualization", "diagnostic", "rosgraph")
 }
-WITHOUT_ROS = {"push_model", "push_scenario", "push_estimation", "push_qp"}
+WITHOUT_ROS = {"push_model", "push_job", "push_scenario", "push_estimation", "push_qp"}
 SHELLS = {"push_planner", "push_mpc", "push_supervisor", "grasp_opt", "swarm_push"}
 LONGEST = 400  # lines
 

@@ -22,6 +22,7 @@ from push_supervisor.machine import State
 
 SCENARIOS = NINE
 """Where none are named."""
+OPTIONS = {"uncertainty": "mild"}
 
 FAR, TURN = 0.04, 0.12
 """[m], [rad] by which the box is moved at most."""

@@ -18,6 +18,7 @@ from push_study.uncertainty import uncertainty
 
 SCENARIOS = ("env3-target1",)
 """Where none are named."""
+OPTIONS = {"uncertainty": "mild"}
 
 GOALS = 56
 """Of a trial."""

@@ -39,6 +39,7 @@ from push_study.study import StudyOptions
 
 SCENARIOS = ("plate_ellipse", "plate_octagon", "plate_rectangle")
 """Objects, where none are named."""
+OPTIONS: dict[str, str] = {}
 ROBOT, ROBOTS = "epuck_ring", (2, 3)
 MODELS = ("limit_surface", "printed")
 GRID = {2: 200, 3: 66}

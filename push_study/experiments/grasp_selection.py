@@ -9,6 +9,7 @@ the object, as in the thesis; and by the group law, which sees it.
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -25,17 +26,18 @@ from push_model.occupancy import rasterise
 from push_model.settings import SettingsError
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
 from push_scenario.bodies import load_object, load_robot
-from push_study.experiments.group_goals import scattered
 from push_study.group_world import TICK, GroupWorld
 from push_study.pool import Row
+from push_study.rooms import scattered
 from push_study.statistics import sign_test
 from push_study.study import StudyOptions
+from push_study.summary import by_cell
 from push_study.synchronised import SynchronisedTrackers
 from push_study.uncertainty import uncertainty
 
 SCENARIOS = ("plate_square", "plate_triangle", "plate_hexagon", "plate_ellipse")
 """Objects, where none are named."""
-CHOOSES_WORLD = True
+OPTIONS = {"uncertainty": "mild", "world": "pybullet"}
 ROBOT, ROBOTS = "epuck_ring", 3
 GRASPS, LAWS = ("selected", "random"), ("mpc", "group")
 SPEED, ACCELERATION = 0.05, 0.05  # [m/s], [m/s^2]
@@ -118,8 +120,8 @@ def trial(task: SelectionTask) -> Row:
     grid, start = rasterise(room), path.pose[0]
     outline = se2.transform(start, item.geometry.outline)
     random = np.random.default_rng(task.seed)
-    size = (float(reach[0]), float(reach[1]))
-    spots = scattered(random, ROBOTS, FreeSpace(grid), outline, robot.footprint_radius, size)
+    radius = robot.footprint_radius
+    spots = scattered(random, ROBOTS, FreeSpace(grid), outline, radius, gap=0.03)
     planner, job = StepPlanner(grid, item, robot), GroupJob(item, robot, ROBOTS)
     doubt, begin = uncertainty(task.uncertainty), item.geometric_pose(start)
     with GroupWorld(room, robot, spots, item, begin, doubt, task.seed, task.world) as world:
@@ -208,6 +210,22 @@ def _follow(
             return "a robot cannot follow its way"
         record.step(twists, plan.trajectory.sample(now))
     return ""
+
+
+def statistics(rows: list[Row]) -> dict[str, Any]:
+    """Means by grasp and law, and the sign tests of the pairs."""
+    result: dict[str, Any] = dict(by_cell(rows, ("grasp", "law"), ("position_error_m", "force_n")))
+    for law in LAWS:
+        pairs = _pairs([r for r in rows if r.get("law") == law], "grasp")
+        lower = sum(p["selected"] < p["random"] for p in pairs)
+        result[f"pairs_of_grasps_{law}"] = len(pairs)
+        result[f"selected_nearer_{law}"] = lower
+        result[f"sign_p_grasp_{law}"] = sign_test(lower, len(pairs))
+    pairs = _pairs(rows, "law")
+    lower = sum(p["group"] < p["mpc"] for p in pairs)
+    result["pairs_of_laws"], result["group_law_nearer"] = len(pairs), lower
+    result["sign_p_law"] = sign_test(lower, len(pairs))
+    return result
 
 
 def conclude(options: StudyOptions, tasks: Sequence[SelectionTask], rows: list[Row]) -> None:

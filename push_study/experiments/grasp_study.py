@@ -23,7 +23,6 @@ from grasp_opt.indices import composed_quality, dexterity, extension, modified_h
 from grasp_opt.object_trajectory import ObjectTrajectory, study_trajectories
 from grasp_opt.selection import random_grasp
 from grasp_opt.wrench_cone import HELD, margin, task_wrenches, wrench_rays
-from push_model.settings import SettingsError
 from push_model.specs import ObjectSpec
 from push_scenario.bodies import load_object
 from push_study.formation import push
@@ -40,7 +39,7 @@ from push_study.study import StudyOptions
 
 SCENARIOS = ("plate_square", "plate_triangle", "plate_hexagon", "plate_ellipse")
 """Objects, where none are named."""
-CHOOSES_WORLD = True
+OPTIONS = {"world": "pybullet"}
 ROBOTS, RADIUS = 3, 0.05
 """How many, and [m] of each."""
 _EVERY = 5  # samples of a trajectory of which the least forces are asked
@@ -76,8 +75,6 @@ class GraspTask:
 def tasks(options: StudyOptions) -> list[GraspTask]:
     """Every object along every trajectory, with as many grasps as there are trials."""
     world = options.world or "pybullet"
-    if options.uncertainty != "mild":
-        raise SettingsError("uncertainty: grasps push without noise and as believed; leave it out")
     digests = {
         name: hashlib.sha256(repr(load_object(name)).encode()).hexdigest()[:16]
         for name in options.scenarios
@@ -175,6 +172,36 @@ def findings(rows: Sequence[Row]) -> Findings:
         good = np.isfinite(value)
         validated[name] = cross_validated(value[good, None], spent[good])
     return Findings(table, rank_sum(slid[test], slid[~test]), fisher(table), known, validated)
+
+
+def statistics(rows: list[Row]) -> dict[str, Any]:
+    """Table 3.1, its p-values, and Pearson's r of E with every index, also cross-validated."""
+    rows = [r for r in rows if "margin" in r]
+    if not rows:
+        return {}
+    found = findings(rows)
+    (failed_fails, failed_passes), (done_fails, done_passes) = found.table.astype(int).tolist()
+    result: dict[str, Any] = {
+        "failed_where_test_fails": failed_fails,
+        "failed_where_test_passes": failed_passes,
+        "succeeded_where_test_fails": done_fails,
+        "succeeded_where_test_passes": done_passes,
+        "ranksum_p": found.rank_sum,
+        "fisher_p": found.fisher,
+    }
+    for kind, by_index in (
+        ("correlation", found.correlations),
+        ("cross_validated", found.validated),
+    ):
+        for index, c in by_index.items():
+            result[f"{kind}_{index}"] = {
+                "r": c.r,
+                "p": c.p,
+                "low": c.low,
+                "high": c.high,
+                "count": c.count,
+            }
+    return result
 
 
 def conclude(options: StudyOptions, tasks: Sequence[GraspTask], rows: list[Row]) -> None:

@@ -7,29 +7,34 @@ pushes, and what is done when something goes wrong.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from grasp_opt.group_job import GroupJob
-from grasp_opt.sequencing import NoStep
-from grasp_opt.step_planner import StepPlanner, StepSettings, TooFew
+from grasp_opt.step_planner import StepSettings
+from push_job.method import Task
 from push_model import se2
 from push_model.arrays import Array
 from push_model.free_space import FreeSpace, Obstacles
-from push_model.jobs import JobError, JobPhase
+from push_model.jobs import JobPhase
 from push_model.object_way import NoObjectWay, WayFinder
-from push_model.occupancy import OccupancyGrid, rasterise
+from push_model.occupancy import rasterise
 from push_model.settings import SettingsError, from_mapping
 from push_model.specs import EnvironmentSpec, ObjectSpec
 from push_scenario.bodies import load_object, load_robot
-from push_study.group_world import GroupWorld
+from push_scenario.events import Kill
+from push_study.graph_run import LockstepRun
 from push_study.pool import Row
+from push_study.rooms import scattered
 from push_study.study import StudyOptions
+from push_study.summary import by_cell
+from push_study.team_run import made_scenario, run_team
 from push_study.uncertainty import uncertainty
 
 SCENARIOS = ("open", "obstacles", "dead")
 """Nothing in the way; obstacles; obstacles, and one of four robots dies in its first push."""
-CHOOSES_WORLD = True
+OPTIONS = {"uncertainty": "mild", "world": "pybullet"}
 ROBOT = "epuck_ring"
 SIZE = (4.0, 3.0)  # [m]
 _GOAL = 0.02, 0.1  # [m], [rad] that count as success
@@ -130,7 +135,8 @@ def problem(task: GoalTask) -> Problem:
             finder.way(start, goal, Obstacles())
         except NoObjectWay:
             continue
-        robots = scattered(random, task.robots, space, se2.transform(start, outline), radius, SIZE)
+        here = se2.transform(start, outline)
+        robots = scattered(random, task.robots, space, here, radius, gap=0.03)
         return Problem(environment, item, start, goal, robots)
     raise RuntimeError("no problem could be drawn")
 
@@ -144,89 +150,41 @@ def _environment(random: np.random.Generator, obstacles: bool) -> EnvironmentSpe
     return from_mapping(EnvironmentSpec, values, "environment")
 
 
-def scattered(
-    random: np.random.Generator,
-    count: int,
-    space: FreeSpace,
-    outline: Array,
-    radius: float,
-    size: tuple[float, float],
-) -> Array:
-    """Poses ``(n, 3)`` of robots anywhere in a room about the origin, not nearer than 3 cm to
-    anything."""
-    placed: list[Array] = []
-    while len(placed) < count:
-        pose = np.append(random.uniform(-0.5, 0.5, 2) * size, random.uniform(-math.pi, math.pi))
-        discs = np.array([[p[0], p[1], radius] for p in placed]).reshape(-1, 3)
-        if space.room(pose[None, :2], Obstacles((outline,), discs))[0] > radius + 0.03:
-            placed.append(pose)
-    return np.array(placed)
-
-
 def trial(task: GoalTask) -> Row:
     """One job."""
     p, robot, doubt = problem(task), load_robot(ROBOT), uncertainty(task.uncertainty)
-    grid: OccupancyGrid = rasterise(p.environment)
-    planner = StepPlanner(grid, p.item, robot)
-    job = GroupJob(p.item, robot, task.robots)
-    job.begin(p.goal)
-    begin, collisions, killed = p.item.geometric_pose(p.start), 0, ""
-    with GroupWorld(
-        p.environment, robot, p.robots, p.item, begin, doubt, task.seed, task.world
-    ) as world:
-        while world.time < _LIMIT and job.busy:
-            seen, robots = world.see()
-            twists = job.step(world.time, p.item.mass_pose(seen), robots)
-            answer(job, planner)
-            if task.scenario == "dead" and not killed and _in_the_middle(job):
-                assert job.plan is not None
-                killed = world.names[job.plan.pushers[task.seed % len(job.plan.pushers)]]
-                world.kill([killed])
-            world.step(twists)
-            collisions += world.felt()[1]
-        off = se2.between(p.goal, world.item.mass_pose(world.truth()[0]))
-        taken, drawn = world.time, world.drawn
-    away, turned = float(np.hypot(off[0], off[1])), abs(float(off[2]))
-    ended = not job.busy and job.error is JobError.NONE
+    start, goal = p.item.geometric_pose(p.start), p.item.geometric_pose(p.goal)
+    scenario = made_scenario(task.scenario, p.environment, robot, p.robots, p.item, start)
+    killed = ""
+
+    def meanwhile(run: LockstepRun, now: float, poses: Array) -> None:
+        nonlocal killed
+        job = run.supervisor.method.job
+        if task.scenario == "dead" and not killed and _in_the_middle(job):
+            pushers = job.plan.pushers
+            killed = f"e{pushers[task.seed % len(pushers)]}"
+            run.bridge.disturb(Kill(at=0.0, robot=killed))
+
+    outcome = run_team(
+        "group", scenario, Task((goal,)), doubt, task.seed, _LIMIT, meanwhile, task.world
+    )
+    away, turned = outcome.error
+    clean = outcome.trace.collision_ticks == 0
+    reached = outcome.success and away <= _GOAL[0] and turned <= _GOAL[1]
+    reason = "" if outcome.success else outcome.reason
+    if reached and not clean:
+        reason = f"collisions in {outcome.trace.collision_ticks} ticks"
     return {
         "scenario": task.scenario,
         "seed": task.seed,
         "robots": task.robots,
         "sides": task.sides,
-        "success": bool(ended and away <= _GOAL[0] and turned <= _GOAL[1]),
-        "reason": job.reason if job.busy or job.error is not JobError.NONE else "",
+        "success": bool(reached and clean),
         "killed": killed,
-        "position_error_m": away,
-        "orientation_error_rad": turned,
-        "duration_s": taken,
         "distance_m": float(np.hypot(*(p.goal - p.start)[:2])),
-        "pushes": job.pushes,
-        "replans": job.replans,
-        "collision_ticks": collisions,
-    } | drawn
-
-
-def answer(job: GroupJob, planner: StepPlanner) -> None:
-    """Plan what a job asks for; the world stands still meanwhile."""
-    request = job.request
-    if request is None:
-        return
-    others = np.zeros((0, 3))
-    try:
-        job.planned(
-            planner.plan(
-                request.pose,
-                request.goal,
-                request.robots,
-                request.dead,
-                others,
-                request.fewest,
-            )
-        )
-    except TooFew as error:
-        job.failed(JobError.TOO_HEAVY, str(error))
-    except NoStep as error:
-        job.failed(JobError.PLANNING_FAILED, str(error))
+        **outcome.row(),
+        "reason": reason,
+    }
 
 
 def _in_the_middle(job: GroupJob) -> bool:
@@ -236,10 +194,22 @@ def _in_the_middle(job: GroupJob) -> bool:
     return job.last.time > 0.5 * job.plan.trajectory.duration
 
 
+def statistics(rows: list[Row]) -> dict[str, Any]:
+    """Means by world and number of robots, over the goals that were reached."""
+    return dict(
+        by_cell(
+            rows,
+            ("scenario", "robots"),
+            ("position_error_m", "orientation_error_rad", "duration_s"),
+        )
+    )
+
+
 def conclude(options: StudyOptions, tasks: Sequence[GoalTask], rows: list[Row]) -> None:
     """By worlds, numbers of robots and shapes."""
     print(
-        "\nworlds      robots   reached     position [mm]      orientation [rad]   time [s]  pushes"
+        "\nworlds      robots   reached     position [mm]      orientation [rad]   "
+        "time [s]  planning [s]"
     )
     for name in options.scenarios:
         counts = sorted({t.robots for t in tasks if t.scenario == name})
@@ -256,8 +226,8 @@ def conclude(options: StudyOptions, tasks: Sequence[GoalTask], rows: list[Row]) 
             print(
                 f"{name:10s} {count or 'all'!s:>6s}  {len(good):3d} of {len(mine):<3d}"
                 f"  {away.mean():6.2f} (<= {away.max():5.2f})  {turned.mean():8.4f} "
-                f"(<= {turned.max():6.4f})  {np.mean([r['duration_s'] for r in good]):7.0f}"
-                f"  {np.mean([r['pushes'] for r in good]):6.1f}"
+                f"(<= {turned.max():6.4f})  {np.mean([r['charged_s'] for r in good]):7.0f}"
+                f"  {np.mean([r['planning_cpu_s'] for r in good]):8.1f}"
             )
     for row in rows:
         if not row["success"]:

@@ -35,7 +35,7 @@ from push_study.uncertainty import uncertainty
 
 SCENARIOS = ("bend", "double-bend", "wave")
 """Trajectories, where none are named."""
-CHOOSES_WORLD = True
+OPTIONS = {"uncertainty": "mild", "world": "pybullet"}
 ROBOTS = (2, 3)
 ROBOT, OBJECT = "epuck_ring", "plate_ellipse"
 SPEED, ACCELERATION = 0.05, 0.05  # [m/s], [m/s^2]

@@ -30,6 +30,7 @@ from push_study.uncertainty import uncertainty
 
 SCENARIOS = ("line",)
 """Where none are named."""
+OPTIONS = {"uncertainty": "mild"}
 
 OFFSETS = (0.1, 0.2, 0.4, 0.5)
 """[m] phi of section 2.4.6."""

@@ -30,6 +30,7 @@ from push_view.report import write_report
 
 SCENARIOS = tuple(f"env{e}-target{t}" for e in (1, 2, 3) for t in (1, 2, 3))
 """Where none are named."""
+OPTIONS = {"uncertainty": "mild"}
 
 
 @dataclass(frozen=True)

@@ -2,13 +2,13 @@
 
 from push_study.pool import Row
 from push_study.study import StudyOptions
-from push_study.swarm_map import MAPS, MapTask, run
-from push_study.swarm_maps import conclude, tasks_of
+from push_study.swarm.map_tables import conclude, tasks_of
+from push_study.swarm.maps import MAPS, MapTask, run
 
-__all__ = ["CHOOSES_WORLD", "SCENARIOS", "conclude", "tasks", "trial"]
+__all__ = ["OPTIONS", "SCENARIOS", "conclude", "tasks", "trial"]
 
 SCENARIOS = tuple(MAPS)
-CHOOSES_WORLD = True
+OPTIONS = {"uncertainty": "mild", "world": "planar"}
 
 
 def tasks(options: StudyOptions) -> list[MapTask]:

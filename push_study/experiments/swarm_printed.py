@@ -3,20 +3,28 @@
 Long runs: a quarter of an hour of simulation each.
 """
 
+from typing import Any
+
 from push_study.pool import Row
 from push_study.study import StudyOptions
-from push_study.swarm_run import SwarmTask, run
-from push_study.swarm_shapes import SHAPES, conclude, tasks_by
+from push_study.summary import by_cell
+from push_study.swarm.shapes import SHAPES, conclude, tasks_by
+from push_study.swarm.targets import SwarmTask, run
 
-__all__ = ["CHOOSES_WORLD", "SCENARIOS", "conclude", "tasks", "trial"]
+__all__ = ["OPTIONS", "SCENARIOS", "conclude", "statistics", "tasks", "trial"]
 
 SCENARIOS = SHAPES
-CHOOSES_WORLD = True
+OPTIONS = {"uncertainty": "mild", "world": "pybullet"}
 
 
 def tasks(options: StudyOptions) -> list[SwarmTask]:
     """Every object with every swarm."""
     return tasks_by("thesis", options)
+
+
+def statistics(rows: list[Row]) -> dict[str, Any]:
+    """Mean Lambda and time by object and number of robots."""
+    return dict(by_cell(rows, ("scenario", "robots"), ("lambda", "duration_s")))
 
 
 def trial(task: SwarmTask) -> Row:

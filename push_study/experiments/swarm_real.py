@@ -5,6 +5,7 @@ Lambda is the time in units of robot speed over the way that the object has to g
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import matplotlib
 
@@ -16,12 +17,13 @@ import numpy as np
 from push_model.settings import SettingsError
 from push_study.pool import Row
 from push_study.study import StudyOptions
-from push_study.swarm_run import EXPERIMENT, SwarmTask, draw_ways, length, run
+from push_study.summary import by_cell
+from push_study.swarm.targets import EXPERIMENT, SwarmTask, draw_ways, length, run
 from push_study.thesis import SWARM_REAL, SWARM_RIVALS
 
 SCENARIOS = ("swarm_square",)
 """Objects, where none are named."""
-CHOOSES_WORLD = True
+OPTIONS = {"uncertainty": "mild", "world": "pybullet"}
 ROBOTS, LAWS = 5, ("crescent", "thesis")
 SIZE = 0.4  # [m] s_O: what 50.4 s, 902 s and 7.15 m of the thesis make it
 _LIMIT = 2400.0  # [s]
@@ -54,6 +56,11 @@ def trial(task: SwarmTask) -> Row:
     if row["success"]:
         row["delta_s"] = row["duration_s"] * SIZE / length(EXPERIMENT)
     return row
+
+
+def statistics(rows: list[Row]) -> dict[str, Any]:
+    """Mean Lambda, time and delta by law."""
+    return dict(by_cell(rows, ("law",), ("lambda", "duration_s", "delta_s")))
 
 
 def conclude(options: StudyOptions, tasks: Sequence[SwarmTask], rows: list[Row]) -> None:

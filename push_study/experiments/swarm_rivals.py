@@ -5,6 +5,7 @@ what is reconstructed. Ours runs on every trial, the others on every tenth, at l
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import matplotlib
 
@@ -16,7 +17,8 @@ import numpy as np
 from push_scenario.bodies import load_object
 from push_study.pool import Row
 from push_study.study import StudyOptions
-from push_study.swarm_rival import OURS, RIVALS, RivalTask, run
+from push_study.summary import by_cell
+from push_study.swarm.contest import OURS, RIVALS, RivalTask, run
 
 SCENARIOS = (
     "transport_square",
@@ -26,7 +28,7 @@ SCENARIOS = (
     "transport_triangle",
 )
 """Objects, where none are named."""
-CHOOSES_WORLD = True
+OPTIONS = {"uncertainty": "mild", "world": "planar"}
 METHODS = (*OURS, *RIVALS)
 ROBOTS = 20
 _THEIRS = 0.35  # [m] about what Queiroz and MacRae take for reached
@@ -58,6 +60,11 @@ def tasks(options: StudyOptions) -> list[RivalTask]:
 def trial(task: RivalTask) -> Row:
     """To the target."""
     return run(task)
+
+
+def statistics(rows: list[Row]) -> dict[str, Any]:
+    """Mean Lambda and time by method and object."""
+    return dict(by_cell(rows, ("method", "scenario"), ("lambda", "duration_s")))
 
 
 def conclude(options: StudyOptions, tasks: Sequence[RivalTask], rows: list[Row]) -> None:

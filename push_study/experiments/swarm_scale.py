@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 import matplotlib
 
@@ -14,16 +15,17 @@ import numpy as np
 from push_model.settings import SettingsError
 from push_model.specs import EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
-from push_study.group_world import GroupWorld
 from push_study.pool import Row
+from push_study.rooms import around
 from push_study.study import StudyOptions
-from push_study.swarm_run import drive, starts
+from push_study.summary import by_cell
+from push_study.swarm.targets import positions
+from push_study.team_run import made_scenario, run_team
 from push_study.uncertainty import uncertainty
-from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
 
 SCENARIOS = ("swarm_square",)
 """The object."""
-CHOOSES_WORLD = True
+OPTIONS = {"uncertainty": "mild", "world": "planar"}
 ROBOTS = (8, 20, 50, 100, 200, 500, 1000)
 DISTANCE = 1.5  # [m]
 REACHED = 0.1  # [m]
@@ -57,28 +59,31 @@ def trial(task: ScaleTask) -> Row:
     """To the position, discs starting anywhere about the object."""
     item, disc = load_object(task.scenario), load_robot("disc")
     half = max(2.5, 0.16 * math.sqrt(task.robots) + 1.5)
-    inner = half - disc.footprint_radius
-    region = inner * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    settings = replace(SwarmJobSettings(), position_tolerance=REACHED, stalled=_LIMIT)
-    job = SwarmJob(region, item, disc, settings)
-    job.begin([np.array([DISTANCE, 0.0, math.nan])])
     random = np.random.default_rng([task.seed, task.robots])
-    begin = starts(random, task.robots, item, disc.footprint_radius)
+    begin = around(random, task.robots, item, disc.footprint_radius)
     room = EnvironmentSpec((2.0 * half, 2.0 * half), resolution=0.05)
+    swarm = {"position_tolerance": REACHED, "orientation": False, "stalled": _LIMIT}
+    scenario = made_scenario(task.scenario, room, disc, begin, item, np.zeros(3), {"swarm": swarm})
     doubt = uncertainty(task.uncertainty)
-    with GroupWorld(room, disc, begin, item, np.zeros(3), doubt, task.seed, task.world) as world:
-        drive(job, world, item, _LIMIT)
-        taken = world.time
+    goal = positions([(DISTANCE, 0.0)])
+    outcome = run_team("swarm", scenario, goal, doubt, task.seed, _LIMIT, world=task.world)
     row: Row = {
         "scenario": task.scenario,
         "seed": task.seed,
         "robots": task.robots,
-        "success": job.index == 1,
-        "reason": "" if job.index == 1 else job.reason,
+        "success": outcome.success,
+        "reason": "" if outcome.success else outcome.reason,
+        "planning_cpu_s": outcome.planning,
     }
-    if job.index == 1:
+    if outcome.success:
+        taken = outcome.charged
         row |= {"duration_s": taken, "lambda": taken * disc.max_speed / DISTANCE}
     return row
+
+
+def statistics(rows: list[Row]) -> dict[str, Any]:
+    """Mean Lambda and time by number of robots."""
+    return dict(by_cell(rows, ("robots",), ("lambda", "duration_s")))
 
 
 def conclude(options: StudyOptions, tasks: Sequence[ScaleTask], rows: list[Row]) -> None:

@@ -9,7 +9,8 @@ bends: they cannot push on before.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 import matplotlib
 
@@ -19,21 +20,22 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from push_model.arrays import Array
-from push_model.occupancy import rasterise
+from push_model.jobs import JobError
 from push_model.specs import EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
-from push_study.group_world import GroupWorld
+from push_scenario.events import Kill
+from push_study.graph_run import LockstepRun
 from push_study.pool import Row
+from push_study.rooms import around
 from push_study.study import StudyOptions
-from push_study.swarm_run import EXPERIMENT, REACHED, ROBOT, drive, starts
+from push_study.swarm.targets import EXPERIMENT, REACHED, ROBOT, length, positions
+from push_study.team_run import made_scenario, run_team
 from push_study.uncertainty import uncertainty
-from swarm_push.region import covered_region
 from swarm_push.rim import Rim
-from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
 
 SCENARIOS = ("swarm_square",)
 """Objects, where none are named."""
-CHOOSES_WORLD = True
+OPTIONS = {"uncertainty": "mild", "world": "planar"}
 ROBOTS, DEAD = 10, 4
 _HALF, _REACH = 2.0, 1.3  # [m] of the room, and of positions
 _LEAST = 0.8  # [m] between positions
@@ -87,40 +89,39 @@ class _Run:
         """
         task, item, robot = self._task, self._item, self._robot
         room = EnvironmentSpec((2.0 * _HALF, 2.0 * _HALF), resolution=0.02)
-        grid = rasterise(room)
-        region = covered_region(grid, robot.footprint_radius)
-        assert region is not None
-        settings = replace(SwarmJobSettings(), position_tolerance=REACHED, stalled=300.0)
-        job = SwarmJob(region, item, robot, settings, grid=grid)
-        job.begin([_position(t) for t in targets])
         random = np.random.default_rng([task.seed, ROBOTS])
-        begin = starts(random, ROBOTS, item, robot.footprint_radius)
-        points = np.array([(0.0, 0.0), *targets])
-        length = float(np.hypot(*np.diff(points, axis=0).T).sum())
-        with GroupWorld(
-            room, robot, begin, item, np.zeros(3), uncertainty(task.uncertainty), task.seed,
+        begin = around(random, ROBOTS, item, robot.footprint_radius)
+        swarm = {"position_tolerance": REACHED, "orientation": False, "stalled": 300.0}
+        scenario = made_scenario(
+            task.scenario, room, robot, begin, item, np.zeros(3), {"swarm": swarm}
+        )
+        way = length(targets)
+        done = False
+
+        def meanwhile(run: LockstepRun, now: float, poses: Array) -> None:
+            nonlocal done, way
+            here = poses[0, :2]
+            if not done and now >= dead_from:
+                for name in list(scenario.robots)[:DEAD]:
+                    run.bridge.disturb(Kill(at=0.0, robot=name))
+                done = True
+            elif not done and moved_to is not None and _away(here, targets[0]) < 0.5 * way:
+                run.supervisor.end_job(JobError.PREEMPTED, "the target was moved")
+                run.supervisor.take_task(positions([moved_to]))
+                way = float(np.hypot(*here)) + _away(here, moved_to)
+                done = True
+
+        outcome = run_team(
+            "swarm",
+            scenario,
+            positions(targets),
+            uncertainty(task.uncertainty),
+            task.seed,
+            _LIMIT,
+            meanwhile,
             task.world,
-        ) as world:  # fmt: skip
-            done = False
-
-            def meanwhile(now: float) -> None:
-                nonlocal done, length
-                here = world.truth()[0][:2]
-                if not done and now >= dead_from:
-                    world.kill(world.names[:DEAD])
-                    done = True
-                elif not done and moved_to is not None and _away(here, targets[0]) < 0.5 * length:
-                    job.retarget(_position(moved_to))
-                    length = float(np.hypot(*here)) + _away(here, moved_to)
-                    done = True
-
-            drive(job, world, item, _LIMIT, meanwhile)
-            reached = job.index == len(targets)
-            return (world.time if reached else math.inf), length
-
-
-def _position(point: tuple[float, float]) -> Array:
-    return np.array([*point, math.nan])
+        )
+        return (outcome.charged if outcome.success else math.inf), way
 
 
 def _away(here: Array, there: tuple[float, float]) -> float:
@@ -161,6 +162,13 @@ def _angle(first: tuple[float, float], second: tuple[float, float]) -> float:
     back, on = -half, np.array(second) - half
     cosine = float(back @ on / (np.hypot(*back) * np.hypot(*on)))
     return math.acos(max(-1.0, min(1.0, cosine)))
+
+
+def statistics(rows: list[Row]) -> dict[str, Any]:
+    """Medians of the ratios over the trials that came through all four runs."""
+    good = [r for r in rows if r["success"]]
+    names = ("dead_over_alive", "moved_over_direct", "with_the_arc")
+    return {f"{n}_median": float(np.median([r[n] for r in good])) for n in names if good}
 
 
 def conclude(options: StudyOptions, tasks: Sequence[UpsetTask], rows: list[Row]) -> None:

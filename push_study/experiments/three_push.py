@@ -27,6 +27,7 @@ from push_view.bodies import bodies_of
 
 SCENARIOS = ("three-push",)
 """Where none are named."""
+OPTIONS = {"uncertainty": "mild"}
 
 VARIANTS: dict[str, dict[str, Any]] = {
     "with (2.53)": {"controller": "contact_force"},

@@ -41,6 +41,7 @@ from push_study.study import StudyOptions
 
 SCENARIOS = ("wheel-slip",)
 """Where none are named."""
+OPTIONS: dict[str, str] = {}
 
 CASES = {1: "I: alone", 2: "II: 3 kg box", 3: "III: mu 0.7 believed"}
 START = np.array([0.0, -3.0, 0.0])

@@ -15,7 +15,7 @@ import numpy as np
 
 from push_model import se2
 from push_model.arrays import Array
-from push_study.rivals.rival import Arena
+from push_study.rivals.rival import RivalArena, rival_spec
 
 _SENSING, _SAFE, _MASS, _SPEED, _STEP = 0.5, 0.15, 8000.0, 0.06, 0.5
 _SAMPLES, _BURNT, _DEVIATION = 60, 36, 0.05
@@ -26,7 +26,7 @@ _FAR = 1e3
 class Gibbs:
     """See the module."""
 
-    def __init__(self, arena: Arena) -> None:
+    def __init__(self, arena: RivalArena) -> None:
         self._arena = arena
         self._random = np.random.default_rng(arena.seed)
         outline = arena.item.geometry.outline
@@ -144,3 +144,6 @@ def _saturated(v: Array, most: float) -> Array:
     size = np.hypot(*v.T)
     slowed: Array = v * np.minimum(1.0, most / np.maximum(size, 1e-12))[:, None]
     return slowed
+
+
+METHOD = rival_spec("gibbs", Gibbs)

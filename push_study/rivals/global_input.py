@@ -18,7 +18,7 @@ import math
 import numpy as np
 
 from push_model.arrays import Array
-from push_study.rivals.rival import Arena
+from push_study.rivals.rival import RivalArena, rival_spec
 
 _CELLS, _SWEEPS, _DISCOUNT = 20, 200, 0.97
 _KP, _KD = 4.0, 1.0
@@ -31,7 +31,7 @@ _MOVES = np.array([[0, 1], [1, 1], [1, 0], [1, -1], [0, -1], [-1, -1], [-1, 0], 
 class GlobalInput:
     """See the module."""
 
-    def __init__(self, arena: Arena) -> None:
+    def __init__(self, arena: RivalArena) -> None:
         self._arena, self._unit = arena, 2.0 * arena.radius
         outline = arena.item.geometry.outline
         self._reach = float(np.hypot(*outline.T).max())
@@ -146,3 +146,6 @@ class GlobalInput:
             value[goal] = 100.0
         best: Array = expected.argmax(axis=0)
         return best
+
+
+METHOD = rival_spec("global-input", GlobalInput)

@@ -16,7 +16,7 @@ import numpy as np
 from push_model import se2
 from push_model.arrays import Array, Mask
 from push_model.outlines import distance, inside
-from push_study.rivals.rival import Arena
+from push_study.rivals.rival import RivalArena, rival_spec
 
 _AT = 0.1  # [m] from the object: at it
 _NEAR, _KEEP = 0.04, 0.2  # [m] between which a robot that moves along it stays
@@ -28,7 +28,7 @@ _DT = 0.02
 class Occlusion:
     """See the module."""
 
-    def __init__(self, arena: Arena) -> None:
+    def __init__(self, arena: RivalArena) -> None:
         self._arena = arena
         self._outline = outline = arena.item.geometry.outline
         following = np.roll(outline, -1, axis=0)
@@ -86,3 +86,6 @@ class Occlusion:
         between = (ahead > 0.5 * r) & (ahead < gap[:, None] + 2.0 * r) & (aside < r)
         clear: Mask = ~between.any(axis=1)
         return clear
+
+
+METHOD = rival_spec("occlusion", Occlusion)

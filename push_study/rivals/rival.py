@@ -1,14 +1,39 @@
-"""What every rival sees and says."""
+"""Rivals as methods: each is a file that says how robots move; the rest is the same for all."""
 
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
+import numpy as np
+
+from push_job.method import Arena, Certificate, MethodSpec, Refusal, Seen, Task, Told
+from push_job.report import Figure, Report, Status, discs
 from push_model.arrays import Array
+from push_model.belief import Belief
+from push_model.jobs import JobError, JobPhase
+from push_model.settings import bounded, settings
 from push_model.specs import ObjectSpec
+
+_LEAD = 0.025  # [m] of the point ahead of the axle that is driven
+_STEP = 0.02  # [s] between decisions, as in the published simulations
+
+
+@settings
+class RivalSettings:
+    """What all rivals have."""
+
+    position_tolerance: float = bounded(
+        0.1, low=1e-3, high=10.0, doc="Distance from the target at which it is reached (m)."
+    )
+    orientation: bool = bounded(
+        False, doc="Whether headings of goals matter. Rivals take positions only: false."
+    )
+    seed: int = bounded(0, low=0, high=2**31 - 1, doc="Seed of the random draws.")
 
 
 @dataclass(frozen=True)
-class Arena:
+class RivalArena:
     """Where a rival works.
 
     size: [m] of a room about the origin. item: the object. radius [m], speed [m/s]: of the robots.
@@ -30,3 +55,118 @@ class Rival(Protocol):
         """``(n, 2)`` [m/s]. time: [s]; pose ``(3,)`` of the object's centre of mass; robots
         ``(n, 3)``: poses."""
         ...
+
+
+class RivalMethod:
+    """Hosts a rival: takes positions, one after another, in an open room."""
+
+    def __init__(self, name: str, make: Callable[[RivalArena], Rival], arena: Arena) -> None:
+        self._name, self._make, self._arena = name, make, arena
+        self._settings = arena.section("", RivalSettings)
+        self._rival: Rival | None = None
+        self._targets: tuple[Array, ...] = ()
+        self._index, self._code = 0, JobError.NONE
+        self._reason, self._busy = "waiting for a goal", False
+        self._next = -math.inf
+        self._held = np.zeros((0, 2))
+
+    @property
+    def status(self) -> Status:
+        """See Method."""
+        phase = JobPhase.PUSHING if self._busy else JobPhase.IDLE
+        count = len(self._targets)
+        progress = self._index / count if count else float(not self._busy)
+        index = min(self._index, max(0, count - 1))
+        return Status(int(phase), phase.name, self._reason, int(self._code), progress, index, count)
+
+    def assess(self, task: Task, belief: Belief, seen: Seen | None) -> Certificate | Refusal:
+        """See Method: a rival takes positions only."""
+        if task.times or not all(math.isnan(t[2]) for t in task.targets):
+            text = f"the method '{self._name}' takes positions, without headings or times"
+            return Refusal(JobError.INVALID_GOAL, text)
+        return Certificate()
+
+    def begin(self, task: Task, belief: Belief) -> None:
+        """See Method."""
+        self._targets, self._index, self._code = task.targets, 0, JobError.NONE
+        self._busy = True
+        self._aim(belief)
+
+    def _aim(self, belief: Belief) -> None:
+        robot, grid = self._arena.robot, self._arena.grid
+        x0, x1, y0, y1 = grid.extent
+        inner = 2.0 * grid.resolution  # the walls of the room
+        item = belief.object(self._arena.object)
+        self._reason = f"target {self._index + 1} of {len(self._targets)}"
+        self._next, self._held = -math.inf, np.zeros((0, 2))
+        self._rival = self._make(
+            RivalArena(
+                (x1 - x0 - inner, y1 - y0 - inner),
+                item,
+                robot.footprint_radius,
+                robot.max_speed,
+                self._targets[self._index][:2],
+                self._settings.seed,
+            )
+        )
+
+    def step(self, seen: Seen, belief: Belief) -> Told:
+        """See Method."""
+        names = [n for n in self._arena.robots if n in seen.robots]
+        away, _ = self.errors(seen)
+        if away < self._settings.position_tolerance:
+            self._index += 1
+            if self._index >= len(self._targets):
+                self.end(JobError.NONE, f"at the goal: {1e3 * away:.0f} mm")
+                return Told()
+            self._aim(belief)
+        if not names or self._rival is None:
+            return Told()
+        robot, robots = self._arena.robot, np.array([seen.robots[n] for n in names])
+        if seen.time >= self._next - 1e-9 or len(self._held) != len(robots):
+            self._next = seen.time + _STEP
+            pose = belief.object(self._arena.object).mass_pose(seen.object)
+            chosen = self._rival.velocities(seen.time, pose, robots)
+            fast = np.hypot(*chosen.T) / robot.max_speed
+            self._held = chosen / np.maximum(fast, 1.0)[:, None]
+        told = self._held
+        if robot.kinematics is not None:
+            told = robot.kinematics.follow(told, robots[:, 2], _LEAD)
+        return Told({n: (float(a), float(b)) for n, (a, b) in zip(names, told, strict=True)})
+
+    def report(self, seen: Seen) -> Report | None:
+        """See Method."""
+        if not self._busy:
+            return None
+        away, _ = self.errors(seen)
+        target = discs("target", self._targets[self._index][None, :2], 0.02)
+        return Report("push", (Figure("to the target", away, "m"),), (target,))
+
+    def end(self, code: JobError, reason: str) -> None:
+        """See Method."""
+        if self._busy:
+            self._busy, self._code, self._reason, self._rival = False, code, reason, None
+
+    def revive(self) -> None:
+        """See Method: a rival does not know which robots fail."""
+
+    def release(self) -> frozenset[str]:
+        """See Method."""
+        return frozenset() if self._busy else frozenset(self._arena.robots)
+
+    def errors(self, seen: Seen) -> tuple[float, float]:
+        """See Method."""
+        if not self._targets:
+            return math.inf, math.inf
+        target = self._targets[min(self._index, len(self._targets) - 1)]
+        here = self._arena.item.mass_pose(seen.object)
+        return math.hypot(here[0] - target[0], here[1] - target[1]), 0.0
+
+    def facts(self) -> Mapping[str, Any]:
+        """See Method."""
+        return {"target": f"{self._index + 1} of {len(self._targets)}"}
+
+
+def rival_spec(name: str, make: Callable[[RivalArena], Rival]) -> MethodSpec:
+    """The row of a rival."""
+    return MethodSpec(name, lambda arena: RivalMethod(name, make, arena), {"": RivalSettings})

@@ -1,5 +1,5 @@
-// A goal is a drag: from where the object shall be, in the direction that it shall face. What is
-// shorter than SHORTEST is a stray click and no goal. Pure functions of a drag that is never changed.
+// A goal is a drag: from the goal position in the direction that the object should face. A drag
+// shorter than SHORTEST is a stray click and no goal. Pure functions of an immutable drag.
 
 export const SHORTEST = 24;   // [CSS pixels]
 
@@ -12,6 +12,6 @@ export function moved(drag, place, pixel) {
   return {...drag, long, theta: long ? theta : drag.theta};
 }
 
-// What releasing the mouse asks for: a pose [m, m, rad], or null for nothing.
+// The goal when the mouse is released: a pose [m, m, rad], or null.
 export const released = drag =>
   drag?.long ? {x: drag.place.x, y: drag.place.y, theta: drag.theta} : null;

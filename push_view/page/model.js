@@ -1,4 +1,4 @@
-// What the page knows: it takes the server's events, one after the other.
+// The state of the page, updated by the events of the server.
 
 export const LONGEST_SILENCE = 800;   // [ms] without an event after which the server counts as gone
 const TRAIL_STEP = 0.004, TRAIL_LENGTH = 3000, TRAILED = 60;   // [m], points, bodies
@@ -10,7 +10,7 @@ export const emptyModel = () => ({
 });
 
 export const newTeam = () => ({
-  state: null, robots: [], log: [], path: null, rows: [], members: new Set(), job: null,
+  state: null, robots: [], log: [], path: null, rows: [], shapes: [], members: new Set(), job: null,
 });
 
 const teamOf = (model, space) => {
@@ -59,7 +59,7 @@ const takers = {
   },
   log: (model, data) => { teamOf(model, data.space).log = data.entries; },
   path: (model, data) => { teamOf(model, data.space).path = data; },
-  panel: (model, data) => { teamOf(model, data.space).rows = data.rows; },
+  panel: (model, data) => { Object.assign(teamOf(model, data.space), {rows: data.rows, shapes: data.shapes}); },
 };
 
 function takeMembers(model, team) {
@@ -68,7 +68,7 @@ function takeMembers(model, team) {
 
 export const KINDS = Object.keys(takers);
 
-// now: [ms] of a clock that never goes back
+// now: [ms] of a monotonic clock
 export function take(model, kind, data, now) {
   model.heard = now;
   takers[kind](model, data);
@@ -80,23 +80,23 @@ export function poseOf(model, i) {
   return {x: p.x[i] * LENGTH, y: p.y[i] * LENGTH, theta: p.a[i] * ANGLE};
 }
 
-// Why no goal is taken for a team now; empty when it is. A paused suite takes goals.
+// Why a team accepts no goal now; empty if it does. A paused suite accepts goals.
 export function trouble(model, space, now) {
   if (model.heard === -Infinity) return "connecting to the viewer";
-  if (now - model.heard > LONGEST_SILENCE) return "the viewer is gone: it says nothing any more";
+  if (now - model.heard > LONGEST_SILENCE) return "the viewer does not respond any more";
   if (!model.suite) return "connecting to the viewer";
   if (model.suite.trouble) return model.suite.trouble;
-  if (!space) return "nobody takes goals yet";
-  return model.suite.teams[space] ?? "nobody takes goals yet";
+  if (!space) return "no node accepts goals yet";
+  return model.suite.teams[space] ?? "no node accepts goals yet";
 }
 
-// What became of a goal that this page sent, by its stamp: {kind, text}, or null.
+// The answer to a goal that this page sent, found by its stamp: {kind, text}, or null.
 export function answerTo(sent, team) {
   if (!sent || !team?.state) return sent ? {kind: "waiting", text: "the goal is sent"} : null;
   const state = team.state;
   if (state.refusals > 0 && state.refused_stamp === sent.stamp) {
     return {kind: "refused", text: `the goal was refused: ${state.refusal}`};
   }
-  if (state.stamp === sent.stamp) return {kind: "taken", text: "the goal is taken"};
+  if (state.stamp === sent.stamp) return {kind: "taken", text: "the goal is accepted"};
   return {kind: "waiting", text: "the goal is sent"};
 }

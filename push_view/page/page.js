@@ -1,4 +1,4 @@
-// The live page: events in, goals out. It draws what is new, when the screen is ready for it.
+// The live page: events in, goals out. It redraws changed parts when the screen is ready.
 
 import {begun, moved, released} from "./goal_drag.js";
 import {KINDS, emptyModel, take, trouble} from "./model.js";

@@ -1,5 +1,5 @@
-// Draws a model on a canvas: map, plans, trails, bodies, goals. Where bodies are many, those that look
-// alike are drawn once, as a picture that is then put where each of them is.
+// Draws a model on a canvas: map, plans, trails, bodies, goals. If there are many bodies, those that
+// look alike are drawn once, as a picture that is then copied to each of them.
 
 import {poseOf} from "./model.js";
 
@@ -10,7 +10,7 @@ const EMPTY = [-1.5, 1.5, -1, 1];
 
 export const teamColor = number => TEAMS[number % TEAMS.length];
 
-// Metres to pixels of the canvas, the map fitted into it.
+// Conversion of metres to pixels of the canvas, into which the map is fitted.
 export function fitted(extent, width, height) {
   const [x0, x1, y0, y1] = extent ?? EMPTY;
   const scale = 0.96 * Math.min(width / (x1 - x0), height / (y1 - y0));
@@ -19,7 +19,7 @@ export function fitted(extent, width, height) {
 export const toPixels = (f, x, y) => [f.ox + f.scale * x, f.oy - f.scale * y];
 export const toMetres = (f, u, v) => ({x: (u - f.ox) / f.scale, y: (f.oy - v) / f.scale});
 
-// So many vertices as can be told apart when the outline is drawn with a scale [pixels/m].
+// As many vertices as are visible when the outline is drawn with a scale [pixels/m].
 export function thinned(outline, scale) {
   const reach = scale * Math.max(...outline.map(p => Math.hypot(...p)));
   const most = Math.max(8, Math.ceil(4 * Math.sqrt(reach)) * 2);
@@ -32,7 +32,7 @@ export class Scene {
 
   frame(model) { return fitted(model.map?.extent, this.canvas.width, this.canvas.height); }
 
-  // Where a pointer event is, in metres and in CSS pixels.
+  // Position of a pointer event, in metres and in CSS pixels.
   place(model, event) {
     const box = this.canvas.getBoundingClientRect(), ratio = this.canvas.width / box.width;
     const pixel = {x: event.clientX - box.left, y: event.clientY - box.top};
@@ -60,10 +60,39 @@ export class Scene {
       const state = model.teams.get(space)?.state;
       if (state?.goal) this.object(f, model, state.object, state.goal, space === chosen ? 2 : 1, false);
     }
+    for (const space of model.spaces) this.layers(f, model.teams.get(space)?.shapes ?? []);
     this.bodies(f, model, colors);
     const item = model.teams.get(chosen)?.state?.object;
     if (drag && item) this.object(f, model, item, [drag.place.x, drag.place.y, drag.theta], 2, drag.long);
     if (drag) this.arrow(f, drag);
+  }
+
+  // What methods report: polylines, polygons, discs and arrows; points in millimetres.
+  layers(f, shapes) {
+    for (const {kind, colour, radius, points} of shapes) {
+      const metres = points.map(([x, y]) => [x / 1e3, y / 1e3]);
+      if (kind === 2) this.discs(f, metres, colour, radius);
+      else if (kind === 3) for (let i = 0; i + 1 < metres.length; i += 2) this.pointed(f, metres[i], metres[i + 1], colour);
+      else this.line(f, kind === 1 && metres.length ? [...metres, metres[0]] : metres, colour, 1);
+    }
+  }
+
+  discs(f, points, colour, radius) {
+    const pen = this.pen;
+    pen.globalAlpha = 0.6; pen.fillStyle = colour;
+    for (const [x, y] of points) {
+      pen.beginPath();
+      pen.arc(...toPixels(f, x, y), Math.max(2 * this.ratio, radius * f.scale), 0, 2 * Math.PI);
+      pen.fill();
+    }
+    pen.globalAlpha = 1;
+  }
+
+  pointed(f, tail, head, colour) {
+    const a = Math.atan2(head[1] - tail[1], head[0] - tail[0]), l = 7 * this.ratio / f.scale;
+    const barb = turn => [head[0] - l * Math.cos(a + turn), head[1] - l * Math.sin(a + turn)];
+    this.line(f, [tail, head], colour, 2);
+    this.line(f, [barb(0.4), head, barb(-0.4)], colour, 2);
   }
 
   // Colour by body: its type's, or its team's where there are several teams.
@@ -95,7 +124,7 @@ export class Scene {
     }
   }
 
-  // An outline with a heading of 0, in the middle of a canvas of its own.
+  // An outline with heading 0, in the middle of its own canvas.
   picture(f, outline, color, of) {
     const key = `${of} ${color} ${f.scale} ${this.ratio}`;
     if (!this.pictures.has(key)) {

@@ -1,4 +1,4 @@
-// The words and numbers beside the map.
+// The text and numbers beside the map.
 
 import {answerTo, poseOf} from "./model.js";
 import {teamColor} from "./scene.js";
@@ -12,7 +12,7 @@ function element(tag, text, style = "") {
   return made;
 }
 
-// Replace what is in an element, unless it is what is there: a choice stays open, a selection stays.
+// Replace the contents of an element only if they changed, so that menus and selections persist.
 function fill(id, key, make) {
   const text = JSON.stringify(key);
   if (SHOWN[id] === text) return;
@@ -40,7 +40,7 @@ function numbers(model, team) {
   return [...rows, ...(team?.rows ?? [])];
 }
 
-// Everything but the map; trouble: why no goal is taken, or empty.
+// Everything but the map; trouble: why no goal is accepted, or empty.
 export function showSide(model, chosen, sent, trouble) {
   const team = model.teams.get(chosen), state = team?.state;
   const paused = !trouble && model.suite?.paused;
@@ -49,7 +49,7 @@ export function showSide(model, chosen, sent, trouble) {
   at("trouble").textContent = trouble || (paused ? "the suite is paused" : "");
   at("scene").className = trouble ? "gone" : "";
   at("hint").textContent = trouble ? "no goal can be sent now"
-    : "drag from the goal in the direction that the object shall face; Escape lets go";
+    : "press at the goal and drag in the direction that the object should face; Escape cancels";
   at("state").textContent = state?.state ?? (trouble ? "no job" : "waiting");
   at("state").className = state?.code ? "failed" : state?.state === "PUSHING" ? "pushing" : "";
   at("reason").textContent = state?.reason ?? "";

@@ -67,7 +67,9 @@ def _add(
         return n
     ints[n, 0], ints[n, 1], ints[n, 2], ints[n, 3], ints[n, 4] = body[pa], body[pb], pa, pb, feature
     reals[n, 0], reals[n, 1], reals[n, 2], reals[n, 3] = nx, ny, px, py
-    reals[n, 4], reals[n, 5] = gap, friction[pa] * friction[pb]
+    among = friction[pa, 1] > 0.0 and friction[pb, 1] > 0.0  # both are robots
+    column = 1 if among else 0
+    reals[n, 4], reals[n, 5] = gap, friction[pa, column] * friction[pb, column]
     return n + 1
 
 

@@ -22,13 +22,15 @@ class Part:
 
     centre: ``(2,)`` [m]; radius: [m] of the disc, or of the circle about centre that holds the
     outline ``(n, 2)``, which is counter-clockwise. friction: of its surface; that of a contact is
-    the product of both.
+    the product of both. robot_friction: of a contact between two robots that are alike; 0 for what
+    is no robot. Of two that differ it is the geometric mean.
     """
 
     centre: Array
     radius: float
     outline: Array | None
     friction: float
+    robot_friction: float = 0.0
 
     @classmethod
     def polygon(cls, outline: Array, friction: float) -> "Part":
@@ -48,7 +50,8 @@ class PartTable:
     """Parts of all bodies; fixed ones have body -1.
 
     body, first, count ``(p,)``: whose it is; its vertices in ``vertices (v, 2)``, none for a disc.
-    local ``(p, 2)``, radius ``(p,)`` [m]: the circle that holds it. friction ``(p,)``.
+    local ``(p, 2)``, radius ``(p,)`` [m]: the circle that holds it. friction ``(p,
+    2)``: its own, and the root of that on its like, -1 for what is no robot.
     """
 
     body: Rows
@@ -70,7 +73,10 @@ class PartTable:
             count.astype(np.int64),
             np.array([p.centre for _, p in parts]).reshape(-1, 2),
             np.array([p.radius for _, p in parts], dtype=np.float64),
-            np.array([p.friction for _, p in parts], dtype=np.float64),
+            np.array(
+                [(p.friction, np.sqrt(p.robot_friction) or -1.0) for _, p in parts],
+                dtype=np.float64,
+            ).reshape(-1, 2),
             np.vstack(outlines) if outlines else np.zeros((1, 2)),
         )
 

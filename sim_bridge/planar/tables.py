@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
@@ -31,8 +32,10 @@ def robot_parts(spec: RobotSpec) -> list[Part]:
     """A disc, or the outline of a flat bumper's robot; about its centre of mass."""
     centre = np.array([-spec.com_ahead, 0.0])
     if isinstance(spec.bumper, RingBumper):
-        return [Part.disc(centre, spec.footprint_radius, _ROBOT_FRICTION)]
-    return body_parts(spec.outline + centre, _ROBOT_FRICTION)
+        parts = [Part.disc(centre, spec.footprint_radius, _ROBOT_FRICTION)]
+    else:
+        parts = body_parts(spec.outline + centre, _ROBOT_FRICTION)
+    return [replace(part, robot_friction=spec.robot_friction) for part in parts]
 
 
 def robot_row(name: str, spec: RobotSpec) -> Row:

@@ -10,8 +10,8 @@ from push_model.occupancy import rasterise
 from push_model.specs import EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
 from push_study.experiments import group_goals
-from push_study.experiments.group_goals import GoalTask, answer
-from push_study.group_world import GroupWorld
+from push_study.experiments.group_goals import GoalTask
+from push_study.group_world import GroupWorld, answer
 from push_study.study import StudyOptions, run_study
 from push_study.uncertainty import uncertainty
 

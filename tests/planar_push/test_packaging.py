@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from push_bringup.systems import MODULES
+from push_bringup.node_kinds import MODULES
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())

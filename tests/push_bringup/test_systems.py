@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 import yaml
 
-from push_bringup.node_settings import SECTIONS, check_settings, resolved
+from push_bringup.node_kinds import MODULES, SECTIONS
+from push_bringup.node_settings import check_settings, resolved
 from push_bringup.preparation import check_bag, prepare
-from push_bringup.systems import LIVE, MODULES, nodes_of, single, teams_of
+from push_bringup.systems import LIVE, nodes_of, single, teams_of
 from push_model.settings import SettingsError
 from push_scenario.scenario import load_scenario, scenario_from_mapping, scenario_from_text
 
@@ -133,7 +134,7 @@ def test_what_the_processes_read_is_what_was_checked(tmp_path):
 def test_a_bag_that_cannot_be_written_is_refused(tmp_path):
     check_bag(tmp_path / "new" / "bag")
     (tmp_path / "bag").mkdir()
-    with pytest.raises(FileExistsError, match="bag is there already"):
+    with pytest.raises(FileExistsError, match="bag exists already"):
         prepare("short", record=tmp_path / "bag")
     (tmp_path / "file").write_text("")
     with pytest.raises(SettingsError, match="cannot be written"):

@@ -97,17 +97,71 @@ def test_quick_frames_are_left_out_where_a_period_is_given(ros):
     world.spinner.close()
 
 
-def test_a_pause_is_no_silence(world):
-    pause = world.other.create_publisher(Bool, "/paused", LATCHED)
-    pause.publish(Bool(data=True))
-    assert world.spinner.until(lambda: world.feed.paused, 15.0)
-    world.feed._last_wall -= 100.0
-    assert world.feed.silence == 0.0
+class Wall:
+    """A wall clock that is set by hand, in the place of ``time``."""
+
+    def __init__(self):
+        self.seconds = 1000.0
+
+    def monotonic(self):
+        return self.seconds
+
+
+@pytest.fixture
+def wall(monkeypatch):
+    wall = Wall()
+    monkeypatch.setattr("push_ros.pace_feed.time", wall)
+    return wall
+
+
+def say(world, topic, value):
+    """Publish a latched flag of the bridge's and have it heard."""
+    publisher = world.other.create_publisher(Bool, f"/{topic}", LATCHED)
+    publisher.publish(Bool(data=value))
+    assert world.spinner.until(lambda: getattr(world.feed.clock, topic) is value, 15.0)
+    return publisher
+
+
+def test_a_pause_is_no_silence(wall, ros):
+    world = World()
+    world.send(0.0, 1.0)
+    wall.seconds += 0.2
+    assert world.feed.silence == pytest.approx(0.2)
+    pause = say(world, "paused", True)
+    wall.seconds += 100.0
+    assert world.feed.paused and world.feed.silence == 0.0
     pause.publish(Bool(data=False))
     assert world.spinner.until(lambda: not world.feed.paused, 15.0)
-    assert world.feed.silence < 15.0
-    world.feed._last_wall -= 100.0
-    assert world.feed.silence > 99.0
+    assert world.feed.silence == pytest.approx(0.2)  # the pause is left out
+    wall.seconds += 99.0
+    assert world.feed.silence == pytest.approx(99.2)
+    world.send(0.0, 1.01)
+    assert world.feed.silence == 0.0
+    world.spinner.close()
+
+
+def test_in_lockstep_only_the_time_of_the_poses_counts(wall, ros):
+    """FAULTS 30: the process may stand still for as long as it likes."""
+    world = World()
+    clock = world.feed.clock
+    world.send(0.0, 1.0)
+    wall.seconds += 3.0
+    live = clock.now
+    say(world, "lockstep", True)
+    assert clock.now == live  # what passed live has been counted
+    wall.seconds += 1e6
+    assert world.feed.silence == 0.0 and clock.now == live
+    world.send(0.0, 1.1)
+    wall.seconds += 1e6
+    assert clock.now == pytest.approx(live + 0.1)
+    for k in range(4):  # a reset of the clock: the new stream counts from where it begins
+        world.send(0.0, 0.1 + 0.01 * k)
+    assert live + 0.1 <= clock.now <= live + 0.131
+    say(world, "lockstep", False)
+    before = clock.now
+    wall.seconds += 2.0
+    assert clock.now == pytest.approx(before + 2.0)
+    world.spinner.close()
 
 
 def test_a_second_source_is_warned_of_as_long_as_it_is_there(world):

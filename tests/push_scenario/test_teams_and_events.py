@@ -85,7 +85,10 @@ def test_teams_have_robots_groups_objects_and_aims():
             },
             ["teams.u", "'x' belongs to team 't'"],
         ),
-        ({"teams": {"t": {"robots": ["a"], "object": "x"}}, "goal": [0, 0, 0]}, ["each has its"]),
+        (
+            {"teams": {"t": {"robots": ["a"], "object": "x"}}, "goal": [0, 0, 0]},
+            ["goals belong to the teams"],
+        ),
         ({"trajectory": [{"at": 0, "pose": [0, 0, 0]}]}, ["at least two"]),
         (
             {"trajectory": [{"at": t, "pose": [0, 0, 0]} for t in (0, 2, 2)]},

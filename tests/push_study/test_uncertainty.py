@@ -68,6 +68,28 @@ def test_of_a_robot_without_wheels_the_rest_is_drawn():
     assert world.object()[1].contact_friction != believed.object()[1].contact_friction
 
 
+@pytest.mark.parametrize(
+    ("level", "low", "high"), [("none", 1.0, 1.0), ("mild", 0.8, 1.2), ("hard", 0.2, 1.0)]
+)
+def test_friction_between_robots_is_drawn_once_for_all_of_them(level, low, high):
+    found = []
+    for believed, world, row in drawn(level, "group-ellipse", range(100)):
+        values = {robot.robot_friction for robot, _ in world.robots.values()}
+        assert values == {row["robot_friction"]} and len(world.robots) > 1
+        assert {robot.robot_friction for robot, _ in believed.robots.values()} == {1.0}
+        found.append(row["robot_friction"])
+    assert low <= min(found) <= low + 0.03 and high - 0.03 <= max(found) <= high
+    assert "robot_friction" not in drawn(level, "short", [1])[0][2]  # one robot has none
+
+
+def test_hard_poses_have_jitter_and_mild_ones_have_not():
+    for level, jitter in (("none", 0.0), ("mild", 0.0), ("hard", 0.005)):
+        ((_, world, _),) = drawn(level, seeds=[1])
+        believed = drawn(level, seeds=[1])[0][0]
+        assert believed.parameters["bridge"]["motion_capture"]["latency_jitter"] == jitter
+        assert world.parameters == believed.parameters
+
+
 def test_an_unknown_name_is_refused():
     with pytest.raises(SettingsError, match="none, mild, hard"):
         uncertainty("much")

@@ -6,7 +6,32 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from push_supervisor import Command, Event, JobError, Machine, State, SupervisorSettings
+from push_supervisor import JobError, Machine, State, SupervisorSettings
+from push_supervisor.commands import (
+    CancelPlan,
+    FindPath,
+    Finish,
+    FollowApproach,
+    FollowPath,
+    FollowPush,
+    FollowRetreat,
+    MakePlan,
+    Stop,
+)
+from push_supervisor.events import (
+    CancelCommanded,
+    ClockReset,
+    ExecuteCommanded,
+    GoalGiven,
+    MapChanged,
+    MotionDone,
+    MotionFailed,
+    ObjectMoved,
+    PathFailed,
+    PathFound,
+    PlanFailed,
+    PlanFound,
+)
 
 
 def segment(side):
@@ -24,29 +49,29 @@ def make(there=False, touching=False, **changes):
 
 
 def commands(out):
-    return [command for command, _ in out]
+    return [type(command) for command in out]
 
 
 def walk(machine, *events):
     out = []
-    for event, payload in events:
-        out = machine.handle(event, **payload)
+    for event in events:
+        out = machine.handle(event)
     return out
 
 
-GOAL = (Event.GOAL, {"goal": "g"})
-DONE = (Event.MOTION_DONE, {})
-PATH = (Event.PATH, {"trajectory": "t"})
+GOAL = GoalGiven("g")
+DONE = MotionDone()
+PATH = PathFound("t")
 
 
 def planned(*sides):
-    return (Event.PLANNED, {"segments": [segment(s) for s in sides]})
+    return PlanFound(tuple(segment(s) for s in sides))
 
 
 def test_algorithm_4_with_a_change_of_side():
     machine, answer = make()
     seen = []
-    for event, payload in [
+    for event in [
         GOAL,
         planned(0, 0, 1),
         PATH,
@@ -60,38 +85,38 @@ def test_algorithm_4_with_a_change_of_side():
         DONE,
         DONE,
     ]:
-        out = machine.handle(event, **payload)
+        out = machine.handle(event)
         seen.append((machine.state.name, *commands(out)))
     assert seen == [
-        ("PLANNING", Command.PLAN),
-        ("POSITIONING", Command.PATH),
-        ("POSITIONING", Command.FOLLOW_PATH),
-        ("APPROACH", Command.FOLLOW_APPROACH),
-        ("PUSHING", Command.FOLLOW_PUSH),
-        ("PUSHING", Command.FOLLOW_PUSH),  # same side: on without letting go
-        ("DETACHING", Command.FOLLOW_RETREAT),
-        ("POSITIONING", Command.PATH),
-        ("POSITIONING", Command.FOLLOW_PATH),
-        ("APPROACH", Command.FOLLOW_APPROACH),
-        ("PUSHING", Command.FOLLOW_PUSH),
-        ("DETACHING", Command.FOLLOW_RETREAT),
+        ("PLANNING", MakePlan),
+        ("POSITIONING", FindPath),
+        ("POSITIONING", FollowPath),
+        ("APPROACH", FollowApproach),
+        ("PUSHING", FollowPush),
+        ("PUSHING", FollowPush),  # same side: on without letting go
+        ("DETACHING", FollowRetreat),
+        ("POSITIONING", FindPath),
+        ("POSITIONING", FollowPath),
+        ("APPROACH", FollowApproach),
+        ("PUSHING", FollowPush),
+        ("DETACHING", FollowRetreat),
     ]
     answer["there"] = True
-    out = machine.handle(Event.MOTION_DONE)
-    assert machine.state is State.IDLE and out[-1][1]["code"] is JobError.NONE
+    out = machine.handle(DONE)
+    assert machine.state is State.IDLE and out[-1].code is JobError.NONE
 
 
 def test_waits_for_the_execute_command():
     machine, _ = make(auto_execute=False)
     walk(machine, GOAL, planned(0))
     assert machine.state is State.IDLE and machine.plan_ready
-    out = machine.handle(Event.EXECUTE)
-    assert machine.state is State.POSITIONING and commands(out) == [Command.PATH]
+    out = machine.handle(ExecuteCommanded())
+    assert machine.state is State.POSITIONING and commands(out) == [FindPath]
 
 
 def test_plan_only_waits_even_when_execution_is_automatic():
     machine, _ = make()
-    machine.handle(Event.GOAL, goal="g", plan_only=True)
+    machine.handle(GoalGiven("g", plan_only=True))
     walk(machine, planned(0))
     assert machine.plan_ready
 
@@ -99,16 +124,15 @@ def test_plan_only_waits_even_when_execution_is_automatic():
 def test_already_there_needs_no_plan():
     machine, _ = make(there=True)
     out = walk(machine, GOAL)
-    assert out[-1][0] is Command.FINISH and out[-1][1]["code"] is JobError.NONE
+    assert type(out[-1]) is Finish and out[-1].code is JobError.NONE
 
 
 def failed(retry=True, crowded=False):
-    payload = {"code": JobError.PLANNING_FAILED, "message": "m", "retry": retry}
-    return (Event.PLAN_FAILED, payload | {"crowded": crowded})
+    return PlanFailed(JobError.PLANNING_FAILED, "m", retry, crowded)
 
 
 def asked(preemptive=False, later=False):
-    return (Command.PLAN, {"goal": "g", "preemptive": preemptive, "later": later})
+    return MakePlan("g", preemptive, later)
 
 
 def test_after_a_failure_a_pre_emptive_push_is_asked_for_once():
@@ -124,7 +148,7 @@ def test_after_a_failure_a_pre_emptive_push_is_asked_for_once():
 def test_gives_up_when_no_pre_emptive_push_helps():
     machine, _ = make()
     out = walk(machine, GOAL, failed(), failed())
-    assert out[-1][1]["code"] is JobError.PLANNING_FAILED and machine.state is State.IDLE
+    assert out[-1].code is JobError.PLANNING_FAILED and machine.state is State.IDLE
 
 
 def test_others_in_the_way_are_waited_for_and_given_up_on_in_the_end():
@@ -135,29 +159,29 @@ def test_others_in_the_way_are_waited_for_and_given_up_on_in_the_end():
         assert walk(machine, crowd) == [asked(preemptive=True)]
         assert walk(machine, crowd) == [asked(later=True)]
     assert walk(machine, crowd) == [asked(preemptive=True)]
-    assert walk(machine, crowd)[-1][1]["code"] is JobError.PLANNING_FAILED
+    assert walk(machine, crowd)[-1].code is JobError.PLANNING_FAILED
 
 
 def test_others_in_the_robots_way_are_waited_for_after_the_retries():
     machine, _ = make(max_retries=1, max_waits=2)
-    no_path = (Event.PATH_FAILED, {"message": "m", "crowded": True})
+    no_path = PathFailed("m", crowded=True)
     walk(machine, GOAL, planned(0))
-    assert commands(walk(machine, no_path)) == [Command.FOLLOW_RETREAT]
+    assert commands(walk(machine, no_path)) == [FollowRetreat]
     walk(machine, DONE, planned(0))
     for _ in range(2):
         (out,) = walk(machine, no_path)
-        assert out[0] is Command.PATH and out[1]["later"]
-    assert walk(machine, no_path)[-1][1]["code"] is JobError.POSITIONING_FAILED
+        assert type(out) is FindPath and out.later
+    assert walk(machine, no_path)[-1].code is JobError.POSITIONING_FAILED
 
 
 @pytest.mark.parametrize("failure", [False, True])
 def test_a_robot_at_the_object_backs_off_before_it_plans(failure):
     """After a cancel, a new goal in a push, or another supervisor's end: no planning round lost."""
     machine, answer = make(touching=True)
-    assert commands(walk(machine, GOAL)) == [Command.FOLLOW_RETREAT]
+    assert commands(walk(machine, GOAL)) == [FollowRetreat]
     assert machine.state is State.DETACHING and "backing off first" in machine.reason
     # Not even the way back may be free: plan from here, and do not try again.
-    event = (Event.MOTION_FAILED, {"message": "stuck"}) if failure else DONE
+    event = MotionFailed("stuck") if failure else DONE
     assert (
         walk(machine, event) == [asked()]
         and machine.state is State.PLANNING
@@ -170,18 +194,18 @@ def test_a_robot_at_the_object_backs_off_before_it_plans(failure):
 
 def test_a_robot_at_the_object_does_not_move_before_it_may():
     machine, _ = make(touching=True)
-    assert machine.handle(Event.GOAL, goal="g", plan_only=True) == [asked()]
+    assert machine.handle(GoalGiven("g", plan_only=True)) == [asked()]
     walk(machine, planned(0))
     assert machine.plan_ready
-    assert commands(machine.handle(Event.EXECUTE)) == [Command.FOLLOW_RETREAT]
-    assert commands(walk(machine, DONE)) == [Command.PATH] and machine.replans == 0
+    assert commands(machine.handle(ExecuteCommanded())) == [FollowRetreat]
+    assert commands(walk(machine, DONE)) == [FindPath] and machine.replans == 0
 
 
 def test_a_robot_that_was_backing_off_goes_on_with_it_when_its_controller_returns():
     machine, _ = make(touching=True)
     walk(machine, GOAL)
-    lost = machine.handle(Event.MOTION_FAILED, message="gone", lost=True)
-    assert commands(lost) == [Command.FOLLOW_RETREAT]
+    lost = machine.handle(MotionFailed("gone", lost=True))
+    assert commands(lost) == [FollowRetreat]
     assert walk(machine, DONE) == [asked()] and machine.replans == 0
 
 
@@ -189,12 +213,12 @@ def test_a_moved_object_next_to_the_robot_is_backed_off_from():
     machine, answer = make()
     walk(machine, GOAL, planned(0), PATH)
     answer["touching"] = True
-    out = machine.handle(Event.DISPLACED, message="moved")
-    assert commands(out) == [Command.STOP, Command.FOLLOW_RETREAT]
+    out = machine.handle(ObjectMoved("moved"))
+    assert commands(out) == [Stop, FollowRetreat]
     assert walk(machine, DONE) == [asked()] and machine.replans == 1
 
 
-NEW_MAP = {"problem": "push 1 meets a wall"}
+NEW_MAP = MapChanged("push 1 meets a wall")
 
 
 @pytest.mark.parametrize("steps", range(8))
@@ -202,21 +226,21 @@ def test_a_map_that_blocks_the_plan_makes_it_anew_in_every_state(steps):
     machine, _ = make()
     walk(machine, *[GOAL, planned(0, 1), PATH, DONE, DONE, DONE, DONE][:steps])
     before = machine.state
-    out = commands(machine.handle(Event.NEW_MAP, **NEW_MAP))
+    out = commands(machine.handle(NEW_MAP))
     if before in (State.IDLE, State.PLANNING):
         assert out == [] and machine.state is before
     elif before in (State.POSITIONING, State.APPROACH):
-        assert out == [Command.STOP, Command.PLAN] and machine.replans == 1
+        assert out == [Stop, MakePlan] and machine.replans == 1
     else:
-        assert out == ([Command.FOLLOW_RETREAT] if before is State.PUSHING else [])
+        assert out == ([FollowRetreat] if before is State.PUSHING else [])
         assert walk(machine, DONE) == [asked()] and machine.replans == 1
 
 
 def test_a_map_that_blocks_nothing_only_makes_the_way_anew():
     machine, _ = make()
-    free = (Event.NEW_MAP, {"problem": ""})
+    free = MapChanged()
     walk(machine, GOAL, planned(0), PATH)
-    assert commands(walk(machine, free)) == [Command.STOP, Command.PATH]
+    assert commands(walk(machine, free)) == [Stop, FindPath]
     for event in (PATH, DONE, DONE):
         before = walk(machine, event)
         assert before and (machine.state is State.POSITIONING or walk(machine, free) == [])
@@ -226,7 +250,7 @@ def test_a_map_that_blocks_nothing_only_makes_the_way_anew():
 def test_a_waiting_plan_that_a_map_blocks_is_made_anew_and_waits_again():
     machine, _ = make(auto_execute=False, touching=True)
     walk(machine, GOAL, planned(0))
-    assert walk(machine, (Event.NEW_MAP, NEW_MAP)) == [asked()]
+    assert walk(machine, NEW_MAP) == [asked()]
     walk(machine, planned(1))
     assert machine.plan_ready and machine.replans == 0
 
@@ -244,14 +268,14 @@ def test_what_remains_of_a_plan():
 def test_hopeless_goal_is_not_retried():
     machine, _ = make()
     out = walk(machine, GOAL, failed(retry=False))
-    assert commands(out) == [Command.FINISH]
+    assert commands(out) == [Finish]
 
 
 def test_failed_push_backs_off_and_plans_anew_from_where_the_object_is():
     machine, _ = make()
     walk(machine, GOAL, planned(0), PATH, DONE, DONE)
-    out = machine.handle(Event.MOTION_FAILED, message="contact lost")
-    assert machine.state is State.DETACHING and commands(out) == [Command.FOLLOW_RETREAT]
+    out = machine.handle(MotionFailed("contact lost"))
+    assert machine.state is State.DETACHING and commands(out) == [FollowRetreat]
     out = walk(machine, DONE)
     assert machine.state is State.PLANNING and out == [asked()]
     assert "contact lost" in machine.reason
@@ -262,66 +286,118 @@ def test_replans_are_bounded():
     out = walk(machine, GOAL)
     for _ in range(3):
         walk(machine, planned(0), PATH, DONE, DONE)
-        out = machine.handle(Event.MOTION_FAILED, message="slipped")
+        out = machine.handle(MotionFailed("slipped"))
         out = walk(machine, DONE)
-    assert out[-1][1]["code"] is JobError.EXECUTION_FAILED and "slipped" in machine.reason
+    assert out[-1].code is JobError.EXECUTION_FAILED and "slipped" in machine.reason
+
+
+def push_once(machine, *sides):
+    """From PLANNING through the first push of a plan."""
+    walk(machine, planned(*sides), PATH, DONE, DONE, DONE)
+
+
+def test_a_move_by_somebody_else_costs_nothing_when_a_push_was_done_in_between():
+    """Each time the second side of the plan is to be pushed, the object is moved again."""
+    machine, _ = make(max_replans=2)
+    walk(machine, GOAL)
+    for count in range(1, 11):
+        push_once(machine, 0, 1)
+        walk(machine, DONE)
+        assert machine.state is State.POSITIONING
+        walk(machine, ObjectMoved("moved"))
+        assert machine.state is State.PLANNING and machine.replans == count
+    push_once(machine, 0)
+    assert machine.pushes == 11 and machine.error is JobError.NONE
+
+
+def test_an_object_that_is_moved_before_any_push_has_its_own_code():
+    machine, _ = make(max_replans=2)
+    walk(machine, GOAL)
+    for _ in range(2):
+        walk(machine, planned(0), ObjectMoved("moved"))
+        assert machine.state is State.PLANNING
+    out = walk(machine, planned(0), ObjectMoved("moved"))
+    assert commands(out) == [Stop, Finish] and out[-1].code is JobError.OBJECT_MOVED
+    assert "3 times" in machine.reason and machine.replans == 2
+
+
+def test_progress_renews_the_budget_of_new_plans():
+    """Four sides to push; each push fails once, and so does the way back from all but the last."""
+    machine, _ = make(max_replans=2)
+    walk(machine, GOAL)
+    for left in (3, 2, 1, 0):
+        walk(machine, planned(*range(left + 1)), PATH, DONE, DONE, MotionFailed("slipped"), DONE)
+        assert machine.state is State.PLANNING
+        push_once(machine, *range(left + 1))
+        if left:
+            walk(machine, MotionFailed("slipped on the way back"))
+            assert machine.state is State.PLANNING
+    assert machine.replans == 7 and machine.error is JobError.NONE
+
+
+def test_pushes_that_lead_nowhere_do_not_renew_it():
+    """The first of two pushes is always done, the second never: that ends."""
+    machine, _ = make(max_replans=2)
+    walk(machine, GOAL)
+    for _ in range(3):
+        push_once(machine, 0, 1)
+        out = walk(machine, DONE, PATH, DONE, DONE, MotionFailed("slipped"), DONE)
+    assert out[-1].code is JobError.EXECUTION_FAILED and machine.pushes == 3
 
 
 def test_off_target_after_the_last_push_plans_anew():
     machine, _ = make(max_replans=0)
     out = walk(machine, GOAL, planned(0), PATH, DONE, DONE, DONE, DONE)
-    assert out[-1][1]["code"] is JobError.OFF_TARGET
+    assert out[-1].code is JobError.OFF_TARGET
 
 
 def test_moved_object_stops_the_robot_and_plans_anew():
     machine, _ = make()
     walk(machine, GOAL, planned(0), PATH)
-    out = machine.handle(Event.DISPLACED, message="moved")
-    assert commands(out) == [Command.STOP, Command.PLAN] and machine.state is State.PLANNING
+    out = machine.handle(ObjectMoved("moved"))
+    assert commands(out) == [Stop, MakePlan] and machine.state is State.PLANNING
 
 
 def test_lost_controller_is_waited_for_and_given_up_on_in_the_end():
     machine, _ = make(max_losses=3)
-    lost = (Event.MOTION_FAILED, {"message": "gone", "lost": True})
+    lost = MotionFailed("gone", lost=True)
     walk(machine, GOAL, planned(0), PATH, DONE, DONE)
     for _ in range(3):  # back off first, whoever does it: the robot stands at the object
-        assert commands(walk(machine, lost)) == [Command.FOLLOW_RETREAT]
-    assert commands(walk(machine, DONE)) == [Command.PLAN] and "gone" in machine.reason
+        assert commands(walk(machine, lost)) == [FollowRetreat]
+    assert commands(walk(machine, DONE)) == [MakePlan] and "gone" in machine.reason
     walk(machine, planned(0), PATH)
-    assert commands(walk(machine, lost)) == [Command.PATH]
+    assert commands(walk(machine, lost)) == [FindPath]
     walk(machine, PATH, DONE, *[lost] * 3)
-    assert walk(machine, lost)[-1][1]["code"] is JobError.NODE_LOST
+    assert walk(machine, lost)[-1].code is JobError.NODE_LOST
 
 
 @pytest.mark.parametrize("steps", range(1, 8))
 @pytest.mark.parametrize(
     ("event", "code"),
-    [(Event.CANCEL, JobError.CANCELED), (Event.CLOCK_RESET, JobError.CLOCK_RESET)],
+    [(CancelCommanded(), JobError.CANCELED), (ClockReset(), JobError.CLOCK_RESET)],
 )
 def test_cancel_and_reset_stop_in_every_state(steps, event, code):
     machine, _ = make()
     walk(machine, *[GOAL, planned(0), PATH, DONE, DONE, DONE][:steps])
-    halt = {State.IDLE: [], State.PLANNING: [Command.CANCEL_PLAN]}.get(
-        machine.state, [Command.STOP]
-    )
+    halt = {State.IDLE: [], State.PLANNING: [CancelPlan]}.get(machine.state, [Stop])
     out = machine.handle(event)
-    assert commands(out) == [*halt, Command.FINISH]
-    assert out[-1][1]["code"] is code and machine.state is State.IDLE and not machine.busy
+    assert commands(out) == [*halt, Finish]
+    assert out[-1].code is code and machine.state is State.IDLE and not machine.busy
 
 
 def test_new_goal_replaces_the_old_one():
     machine, _ = make()
     walk(machine, GOAL, planned(0), PATH)
-    out = machine.handle(Event.GOAL, goal="h")
-    assert commands(out) == [Command.STOP, Command.FINISH, Command.PLAN]
-    assert out[1][1]["code"] is JobError.PREEMPTED and machine.goal == "h"
+    out = machine.handle(GoalGiven("h"))
+    assert commands(out) == [Stop, Finish, MakePlan]
+    assert out[1].code is JobError.PREEMPTED and machine.goal == "h"
 
 
 ANY = st.sampled_from(
     [
         GOAL,
-        (Event.EXECUTE, {}),
-        (Event.CANCEL, {}),
+        ExecuteCommanded(),
+        CancelCommanded(),
         planned(0),
         planned(0, 1),
         planned(1, 1),
@@ -329,22 +405,22 @@ ANY = st.sampled_from(
         failed(False),
         failed(crowded=True),
         PATH,
-        (Event.PATH_FAILED, {"message": "m"}),
-        (Event.PATH_FAILED, {"message": "m", "crowded": True}),
+        PathFailed("m"),
+        PathFailed("m", crowded=True),
         DONE,
-        (Event.MOTION_FAILED, {"message": "m"}),
-        (Event.MOTION_FAILED, {"message": "m", "lost": True}),
-        (Event.DISPLACED, {"message": "m"}),
-        (Event.NEW_MAP, {"problem": "p"}),
-        (Event.NEW_MAP, {"problem": ""}),
-        (Event.CLOCK_RESET, {}),
+        MotionFailed("m"),
+        MotionFailed("m", lost=True),
+        ObjectMoved("m"),
+        MapChanged("p"),
+        MapChanged(),
+        ClockReset(),
     ]
 )
 MOTIONS = {
-    Command.FOLLOW_PATH,
-    Command.FOLLOW_APPROACH,
-    Command.FOLLOW_PUSH,
-    Command.FOLLOW_RETREAT,
+    FollowPath,
+    FollowApproach,
+    FollowPush,
+    FollowRetreat,
 }
 
 
@@ -352,12 +428,12 @@ MOTIONS = {
 def test_invariants_of_any_walk(events, automatic, there, touching):
     machine, _ = make(there, touching, auto_execute=automatic)
     allowed = automatic
-    for event, payload in events:
+    for event in events:
         before = machine.state
         allowed = automatic or (
-            event is Event.EXECUTE if machine.plan_ready else allowed and machine.busy
+            isinstance(event, ExecuteCommanded) if machine.plan_ready else allowed and machine.busy
         )
-        out = commands(machine.handle(event, **payload))
+        out = commands(machine.handle(event))
         assert sum(c in MOTIONS for c in out) <= 1
         if MOTIONS & set(out):
             assert machine.state not in (State.IDLE, State.PLANNING)
@@ -366,8 +442,8 @@ def test_invariants_of_any_walk(events, automatic, there, touching):
             assert machine.index < len(machine.segments)
         if machine.state is State.IDLE and before not in (State.IDLE, State.PLANNING):
             # nothing moves a robot after a job has ended
-            assert Command.STOP in out or before is State.DETACHING
-            assert Command.FINISH in out
-        if Command.FINISH in out and machine.state is State.IDLE:
+            assert Stop in out or before is State.DETACHING
+            assert Finish in out
+        if Finish in out and machine.state is State.IDLE:
             assert not machine.busy and machine.segments == []
         assert machine.reason

@@ -1,6 +1,7 @@
 """Asking, waiting and giving up, with a clock of our own; and an exhaustive random walk."""
 
 import math
+import typing
 
 import numpy as np
 import pytest
@@ -9,13 +10,30 @@ from hypothesis import settings as budget
 from hypothesis import strategies as st
 
 from push_model.jobs import JobError
-from push_supervisor import Command, Moment, Peer, Request, Requests, Step, SupervisorSettings
+from push_supervisor import Moment, Peer, Request, Requests, Step, SupervisorSettings
+from push_supervisor.commands import (
+    FindPath,
+    FollowApproach,
+    FollowPath,
+    FollowPush,
+    FollowRetreat,
+    MakePlan,
+    Question,
+)
 from push_supervisor.requests import ASKS, PEERS
 
 SETTINGS = SupervisorSettings(
     node_timeout=5.0, answer_timeout=2.0, controller_timeout=1.0, wait=3.0
 )
-PLAN, PUSH = Request(Command.PLAN, {"goal": "g"}), Request(Command.FOLLOW_PUSH)
+PLAN, PUSH = Request(MakePlan("g")), Request(FollowPush("s"))
+QUESTIONS = (
+    MakePlan("g"),
+    FindPath("s"),
+    FollowPath("t"),
+    FollowApproach("s"),
+    FollowPush("s"),
+    FollowRetreat(),
+)
 ALL = frozenset(Peer)
 
 
@@ -30,7 +48,7 @@ def begun(request, now=None):
 
 
 def test_everything_that_is_asked_for_has_somebody_to_ask():
-    assert set(PEERS) == set(Command) - {Command.STOP, Command.CANCEL_PLAN, Command.FINISH}
+    assert set(PEERS) == set(typing.get_args(Question)) == set(map(type, QUESTIONS))
 
 
 def test_asked_at_once_and_answered():
@@ -99,8 +117,33 @@ def test_a_controller_is_lost_when_both_clocks_say_so(wall, stamp, lost):
     assert (requests.request is None) == lost
 
 
+def locked(clock, ready=ALL):
+    """In lockstep: the clock is that of the poses."""
+    return Moment(clock, clock, True, ready.__contains__, lockstep=True)
+
+
+@pytest.mark.parametrize("request_", [PLAN, Request(FindPath("s"))])
+def test_in_lockstep_a_planner_is_lost_only_when_it_leaves_the_graph(request_):
+    requests = begun(request_, locked(0.0))
+    assert requests.tend(locked(0.0)).step is Step.ASK
+    for clock in (3.0, 1e3, 1e9):  # fast simulations and slow planners
+        assert requests.tend(locked(clock)).step is Step.WAIT and requests.asks == 1
+    gone = frozenset()
+    assert requests.tend(locked(1e9 + 2.1, gone)).step is Step.WAIT and requests.asks == 1
+    assert requests.tend(locked(1e9 + 7.0, gone)).step is Step.WAIT
+    verdict = requests.tend(locked(1e9 + 7.2, gone))  # 5 s after it was to be asked again
+    assert (verdict.step, verdict.code) == (Step.GIVE_UP, JobError.NODE_LOST)
+
+
+def test_in_lockstep_a_controller_answers_in_pose_time():
+    requests = begun(PUSH, locked(0.0))
+    requests.tend(locked(0.0))
+    assert requests.tend(locked(1.0)).step is Step.WAIT
+    assert requests.tend(locked(1.1)).step is Step.LOST
+
+
 def test_a_delay_is_counted_in_pose_time():
-    requests = begun(Request(Command.PLAN, {}, 3.0), at(10.0, 20.0))
+    requests = begun(Request(MakePlan("g"), 3.0), at(10.0, 20.0))
     assert requests.tend(at(1000.0, 22.9)).step is Step.WAIT
     assert requests.tend(at(1000.0, 23.0)).step is Step.ASK
 
@@ -114,7 +157,7 @@ def test_what_is_dropped_is_not_asked_and_not_answered():
 
 
 EVENTS = st.one_of(
-    st.tuples(st.just("begin"), st.sampled_from(list(PEERS)), st.sampled_from([0.0, 3.0])),
+    st.tuples(st.just("begin"), st.sampled_from(QUESTIONS), st.sampled_from([0.0, 3.0])),
     st.tuples(st.just("tend"), st.floats(0.0, 4.0), st.sets(st.sampled_from(Peer))),
     st.tuples(st.just("blind"), st.floats(0.0, 4.0), st.none()),
     st.tuples(st.just("sign"), st.integers(-1, 0), st.none()),
@@ -130,7 +173,7 @@ def test_invariants_of_any_walk(events):
     wall, since_heard, asks, current, begun_at = 0.0, 0.0, 0, None, 0.0
     for kind, a, b in events:
         if kind == "begin":
-            requests.begin(Request(a, {}, b), at(wall))
+            requests.begin(Request(a, b), at(wall))
             asks, current, begun_at = 0, None, wall + b
         elif kind == "drop":
             requests.drop()
@@ -174,7 +217,7 @@ def test_invariants_of_any_walk(events):
                 current = None
 
 
-@pytest.mark.parametrize("command", PEERS)
+@pytest.mark.parametrize("command", QUESTIONS)
 @pytest.mark.parametrize("seed", range(60))
 def test_every_errand_ends_when_nobody_answers(command, seed):
     """Whatever comes and goes in between: bounded by the times of waiting and asking."""
@@ -186,6 +229,6 @@ def test_every_errand_ends_when_nobody_answers(command, seed):
         poses, there = random.random(2) < often
         now = at(0.5 * step, poses=bool(poses), ready=ALL if there else frozenset())
         if requests.tend(now).step in (Step.GIVE_UP, Step.LOST):
-            ended = now.wall
+            ended = now.clock
             break
     assert ended <= ASKS * (SETTINGS.node_timeout + SETTINGS.answer_timeout + 1.0)

@@ -125,7 +125,7 @@ def test_the_page_tells_what_became_of_its_own_goal(shown):
     state.goal = mine
     state.refused_goal = type(mine)()
     shown.page.suite.states["/"].publish(state)
-    shown.until("document.getElementById('answer').textContent === 'the goal is taken'")
+    shown.until("document.getElementById('answer').textContent === 'the goal is accepted'")
 
 
 def test_a_page_whose_suite_is_gone_says_so_and_sends_nothing(shown):
@@ -190,7 +190,7 @@ def test_what_counts_as_silence(shown):
         return seen.map(text => text.split(":")[0]); })()"""
     ) == [
         "connecting to the viewer", "", "", "the viewer is gone", "deaf",
-        "nobody takes goals yet", "nobody takes goals yet", "silent",
+        "no node accepts goals yet", "no node accepts goals yet", "silent",
     ]  # fmt: skip
 
 

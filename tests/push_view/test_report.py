@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PIL import Image
+from push_view.panels import panel_of
 from rclpy.serialization import serialize_message
 
 from push_model.specs import EnvironmentSpec
@@ -15,7 +16,6 @@ from push_record.contents import load
 from push_ros.conversions import contacts_to_ros, pose_stamped_to_ros, poses_to_ros, time_to_ros
 from push_view.bodies import OBJECT, ROBOT, bodies_of
 from push_view.drawing import body_vertices, moments
-from push_view.panels import panel_of
 from push_view.report import PRODUCTS, final_error, write_report
 from sim_bridge.world import Contact
 

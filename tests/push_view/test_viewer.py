@@ -210,7 +210,7 @@ def test_a_team_that_leaves_the_graph_takes_no_goal(teams):
     teams.suite.node.destroy_publisher(teams.suite.states["/left/"])
     assert teams.until(lambda: teams.node.suite()["teams"]["/left/"] != "")
     status, data = teams.send(space="/left/", **GOAL)
-    assert status == 409 and b"nobody takes goals on /left/goal_pose" in data
+    assert status == 409 and b"no node accepts goals on /left/goal_pose" in data
     assert teams.send(space="/right/", **GOAL)[0] == 202
 
 

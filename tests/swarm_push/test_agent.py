@@ -8,7 +8,7 @@ import pytest
 from push_msgs.msg import SwarmAgentState, SwarmTarget
 from push_ros.validation import InvalidMessage
 from push_scenario.bodies import load_object, load_robot
-from push_study.swarm_map import MapTask, run
+from push_study.swarm.maps import MapTask, run
 from swarm_push.agent import Agent, AgentSettings, AgentState
 from swarm_push.laws import LawSections, LawSettings
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings

@@ -11,7 +11,6 @@ from push_model.occupancy import rasterise
 from push_model.specs import EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
 from push_study.group_world import GroupWorld
-from push_study.swarm_run import drive
 from push_study.uncertainty import uncertainty
 from swarm_push.crescent_law import CrescentLaw
 from swarm_push.law import Scene
@@ -19,6 +18,7 @@ from swarm_push.liveness import LivenessCheck
 from swarm_push.region import covered_region
 from swarm_push.rim import Rim
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
+from tests.driving import drive
 
 NAMES = ("a", "b", "c")
 DT = 0.02

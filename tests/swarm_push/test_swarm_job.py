@@ -14,13 +14,14 @@ from push_msgs.action import SwarmMove
 from push_ros.validation import InvalidMessage
 from push_scenario.bodies import load_object, load_robot
 from push_study.group_world import GroupWorld
-from push_study.swarm_run import drive, starts
+from push_study.rooms import around as starts
 from push_study.uncertainty import uncertainty
 from swarm_push.crescent_law import CrescentLawSettings
 from swarm_push.laws import LawSections, LawSettings
+from swarm_push.node import targets_from_ros
 from swarm_push.region import covered_region, is_open
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
-from swarm_push.swarm_messages import targets_from_ros
+from tests.driving import drive
 
 ROBOT = load_robot("epuck_ring")
 NONE = np.zeros((0, 3))
@@ -195,17 +196,16 @@ def test_the_region_is_the_rectangle_about_free_cells():
 
 
 def test_targets_of_the_action():
-    item = replace(load_object("swarm_square"), com=(0.05, 0.0))
-    without = targets_from_ros(SwarmMove.Goal(x=[1.0, 2.0], y=[0.0, 1.0]), item)
+    without = targets_from_ros(SwarmMove.Goal(x=[1.0, 2.0], y=[0.0, 1.0])).targets
     assert len(without) == 2 and all(math.isnan(t[2]) for t in without)
-    (given,) = targets_from_ros(SwarmMove.Goal(x=[1.0], y=[0.0], theta=[0.5 * math.pi]), item)
-    assert np.allclose(given, [1.0, 0.05, 0.5 * math.pi])
+    (given,) = targets_from_ros(SwarmMove.Goal(x=[1.0], y=[0.0], theta=[0.5 * math.pi])).targets
+    assert np.allclose(given, [1.0, 0.0, 0.5 * math.pi])
     for x, y, theta in (
         ([], [], []), ([1.0], [], []), ([1.0], [1.0], [0.0, 1.0]), ([math.inf], [0.0], []),
         ([0.0] * 1001, [0.0] * 1001, []),
     ):  # fmt: skip
         with pytest.raises(InvalidMessage):
-            targets_from_ros(SwarmMove.Goal(x=x, y=y, theta=theta), item)
+            targets_from_ros(SwarmMove.Goal(x=x, y=y, theta=theta))
 
 
 def test_a_patient_law_waits_for_who_is_in_front():

@@ -12,7 +12,7 @@ from push_model.object_way import NoObjectWay
 from push_model.occupancy import rasterise
 from push_model.specs import BoxSpec, EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
-from push_study.swarm_map import MAPS, MapTask, load_map, run
+from push_study.swarm.maps import MAPS, MapTask, load_map, run
 from swarm_push.object_track import ObjectTrack, TrackSettings
 from swarm_push.region import covered_region, is_open
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings

@@ -9,8 +9,9 @@ from rclpy.action import ActionClient
 from grasp_opt.object_trajectory import polynomial, sampled, screw
 from push_model.jobs import JobError
 from push_msgs.action import PushAlong
-from push_msgs.msg import GroupStatus, JobState
+from push_msgs.msg import JobState, Report
 from push_ros.qos import STATUS
+from push_ros.report_conversions import report_from_ros
 from push_scenario.scenario import load_scenario, scenario_from_mapping
 from push_study.graph_run import LockstepRun
 
@@ -47,22 +48,27 @@ def error(run, goal):
 def test_a_goal_is_reached_and_told(run):
     """And what is asked of the robots is told at every tick of a push."""
     told = []
-    run.observer.create_subscription(GroupStatus, "/group_status", told.append, STATUS)
+    run.observer.create_subscription(Report, "/report", told.append, STATUS)
     goal = np.array(VALUES["goal"])
     state = run.reach(goal)
     assert state is not None and state.error_code == 0 and state.system == "group"
     assert state.progress == 1.0 and state.state == JobState.IDLE
     away, turned = error(run, goal)
     assert away < 5e-3 and turned < 0.03 and run.observer.trace.collisions == 0
-    pushing = [m for m in told if len(m.force_x)]
-    assert len(pushing) > 200
-    for m in pushing[::50]:
-        forces = np.column_stack([m.force_x, m.force_y])
-        normals = np.column_stack([m.normal_x, m.normal_y])
-        inward = (forces * normals).sum(axis=1)
-        along = np.abs(normals[:, 0] * forces[:, 1] - normals[:, 1] * forces[:, 0])
-        assert (along <= m.friction * inward + 1e-9).all() and m.margin > 0.0
-        assert m.position_error < 0.02 and len(m.pushers) == len(m.force_x)
+    reports = [report_from_ros(m) for m in told]
+    pushing = [r for r in reports if any(s.layer == "forces" for s in r.shapes)]
+    assert len(pushing) > 40
+    for r in pushing[::10]:
+        (forces,) = [s for s in r.shapes if s.layer == "forces"]
+        cones = [s for s in r.shapes if s.layer == "friction cones"]
+        assert len(forces.points) == 2 * len(cones)
+        for tail, head, cone in zip(forces.points[::2], forces.points[1::2], cones, strict=True):
+            left, point, right = cone.points
+            assert tail == pytest.approx(point)
+            for edge, side in ((left - point, -1.0), (right - point, 1.0)):
+                cross = edge[0] * (head - tail)[1] - edge[1] * (head - tail)[0]
+                assert side * cross >= -1e-9
+        assert r.figure("grasp margin") > 0.0 and r.figure("position error") < 0.02
 
 
 @pytest.mark.parametrize(
@@ -117,7 +123,7 @@ def test_on_a_trajectory_that_no_placement_holds_the_robots_change_places(run):
     pose = np.vstack([first.pose, second.pose[1:]])
     result = along(run, sampled(time, pose))
     assert result.error_code == 0, result.error_msg
-    assert run.supervisor.job.pushes >= 2
+    assert run.supervisor.method.job.pushes >= 2
     assert error(run, pose[-1])[0] < 5e-3
 
 
@@ -145,7 +151,7 @@ def test_a_robot_that_dies_is_left_and_the_others_go_on():
         assert state is not None and state.error_code == 0, state and state.reason
         away, turned = error(run, goal)
         assert away < 5e-3 and turned < 0.03
-        job = run.supervisor.job
+        job = run.supervisor.method.job
         assert job.dead in ((), (1,)), "it may have stood out of everybody's way"
 
 

@@ -33,8 +33,8 @@ def pushing(run):
     assert run.spin_until(
         lambda: (
             run.observer.state.state == JobState.PUSHING
-            and run.supervisor.job.last is not None
-            and run.supervisor.job.last.time > 2.0
+            and run.supervisor.method.job.last is not None
+            and run.supervisor.method.job.last.time > 2.0
         ),
         120.0,
     )
@@ -51,7 +51,7 @@ def test_when_the_object_is_not_seen_all_stand_and_go_on_when_it_is():
         assert error(run, FAR)[0] < 5e-3
         blind = [speed for when, speed in told if 24.4 < when < 27.9]
         assert len(blind) > 300 and max(blind) == 0.0
-        assert run.supervisor.job.dead == () and run.supervisor.job.replans == 0
+        assert run.supervisor.method.job.dead == () and run.supervisor.method.job.replans == 0
 
 
 def test_an_object_that_somebody_moves_is_noticed_and_brought_all_the_same():
@@ -61,7 +61,7 @@ def test_an_object_that_somebody_moves_is_noticed_and_brought_all_the_same():
         run.start()
         state = run.reach(FAR, 500.0)
         assert state is not None and state.error_code == 0, state and state.reason
-        assert error(run, FAR)[0] < 5e-3 and run.supervisor.job.replans >= 1
+        assert error(run, FAR)[0] < 5e-3 and run.supervisor.method.job.replans >= 1
 
 
 @pytest.fixture
@@ -136,7 +136,7 @@ def test_a_flood_of_goals_ends_with_the_last_one(run):
     for goal in (*goals, goals[-1], goals[-1]):
         run.observer.send_goal(goal)
     pushing(run)
-    jobs, job = run.observer.state.job, run.supervisor.job
+    jobs, job = run.observer.state.job, run.supervisor.method.job
     pushes, replans = job.pushes, job.replans
     for _ in range(5):
         run.observer.send_goal(goals[-1])

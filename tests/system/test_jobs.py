@@ -196,7 +196,7 @@ def test_a_pause_in_mid_push_stands_still_and_goes_on(jobs):
     assert jobs.run.bridge.tick == tick and jobs.state.state == JobState.PUSHING
     pause(jobs, False)
     assert jobs.ended().error_code == 0
-    assert jobs.run.bridge.lockstep_timeouts == 0 and jobs.state.replans == 0
+    assert jobs.run.bridge.unanswered == 0 and jobs.state.replans == 0
 
 
 def test_another_scenario_with_other_names_can_be_loaded(jobs, tmp_path):

@@ -4,6 +4,7 @@ import hashlib
 import os
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -24,6 +25,15 @@ from push_study.observer import final_errors
 from tf2_msgs.msg import TFMessage
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+
+
+NODE_MODULES = (
+    "push_ros.pace_feed",
+    "push_mpc.node",
+    "sim_bridge.node",
+    "sim_bridge.command_intake",
+)
+"""Where the nodes of one robot look at the wall clock, but the planner's."""
 
 
 def noisy(name="short", seed=3):
@@ -48,9 +58,15 @@ def run_once(seed=3):
         state = run.reach(scenario.goal)
         trace = run.observer.trace
         assert state is not None and state.error_code == 0, state
-        assert run.bridge.lockstep_timeouts == 0
+        assert run.bridge.unanswered == 0
         data = np.array(trace.robot).tobytes() + np.array(trace.object).tobytes()
         return hashlib.sha256(data).hexdigest()
+
+
+@pytest.fixture(scope="module")
+def undisturbed():
+    """Digest of a run that nothing disturbs."""
+    return run_once()
 
 
 @pytest.fixture
@@ -87,8 +103,8 @@ def ends(run, limit=120.0):
     return run.observer.state
 
 
-def test_equal_seeds_give_equal_runs_to_the_bit_also_in_a_fresh_process():
-    here = run_once()
+def test_equal_seeds_give_equal_runs_to_the_bit_also_in_a_fresh_process(undisturbed):
+    here = undisturbed
     assert here == run_once()
     code = "from tests.system.test_lockstep import run_once; print(run_once())"
     out = subprocess.run(
@@ -213,19 +229,43 @@ def test_nan_poses_stop_the_robot_and_good_ones_let_it_go_on(short):
     assert final_errors(short.observer.trace, short.scenario.goal)[0] < 0.02
 
 
-def test_stopped_stream_stops_the_robot_and_its_return_lets_it_go_on():
-    """FAULTS 7: no frames at all for half a second of sim time."""
-    scenario = load_scenario("short").settings("bridge", lockstep_timeout=0.05)
-    with LockstepRun(scenario, quiet=True) as run:
-        run.start()
-        pushing(run)
-        until = run.bridge.time + 0.5
-        tamper(run, lambda message: [message] if run.bridge.time > until else [])
-        moved(run, 0.3)
-        assert moved(run, 0.15) < 2e-4
-        assert run.bridge.lockstep_timeouts > 10
-        assert ends(run).error_code == 0
-        assert final_errors(run.observer.trace, scenario.goal)[0] < 0.02
+def test_stopped_stream_stops_the_robot_and_its_return_lets_it_go_on(short, monkeypatch):
+    """FAULTS 7: no frames at all for half a second of sim time. Nobody answers what is not sent."""
+    pushing(short)
+    until, capture = short.bridge.time + 0.5, short.bridge._capture
+    observe, sent = capture.observe, []
+
+    def blind(tick, poses):
+        frame = observe(tick, poses)
+        sent.append(short.bridge.time > until)
+        return frame if sent[-1] else None
+
+    monkeypatch.setattr(capture, "observe", blind)
+    start = short.bridge.tick
+    short.spin_until(lambda: any(sent), 5.0)
+    assert sent.count(False) == 50 and short.bridge.tick >= start + 50
+    assert not short.bridge.driving("epuck1")  # since 0.2 s after the last frame
+    assert short.bridge.unanswered == 0
+    assert ends(short).error_code == 0
+    assert final_errors(short.observer.trace, short.scenario.goal)[0] < 0.02
+
+
+def test_a_wall_clock_that_leaps_changes_nothing(monkeypatch, undisturbed):
+    """FAULTS 30: each look at the wall clock finds that 20 s have passed, more than any limit."""
+    leaps = [0]
+
+    class Leaping:
+        thread_time, perf_counter = time.thread_time, time.perf_counter
+
+        @staticmethod
+        def monotonic():
+            leaps[0] += 1
+            return 20.0 * leaps[0]
+
+    for module in NODE_MODULES:
+        monkeypatch.setattr(f"{module}.time", Leaping)
+    assert run_once() == undisturbed
+    assert leaps[0] > 1000
 
 
 def test_jumped_pose_is_not_chased(short):

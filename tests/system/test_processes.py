@@ -10,7 +10,8 @@ import pytest
 
 from push_bringup.launcher import Child, Launcher
 from push_bringup.monitor import Monitor
-from push_bringup.systems import MODULES, recorder
+from push_bringup.node_kinds import MODULES
+from push_bringup.systems import recorder
 from push_model.jobs import JobError
 from push_msgs.msg import JobState
 from push_record.bag import read_bag

@@ -11,7 +11,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from push_bringup.failures import DomainInUse, SuiteFailed
 from push_bringup.launcher import Launcher
-from push_bringup.node_settings import SECTIONS
+from push_bringup.node_kinds import SECTIONS
 from push_bringup.suite import Suite
 from push_model.jobs import JobError
 from push_record.bag import read_bag

@@ -8,11 +8,11 @@ from rclpy.action import ActionClient
 
 from push_model.jobs import JobError
 from push_msgs.action import SwarmMove
-from push_msgs.msg import JobState, SwarmStatus
+from push_msgs.msg import JobState, Report
 from push_ros.qos import STATUS
+from push_ros.report_conversions import report_from_ros
 from push_scenario.scenario import scenario_from_mapping
 from push_study.graph_run import LockstepRun
-from swarm_push.swarm_messages import density_from_ros
 
 VALUES = {
     "environment": {"size": [4.0, 3.0]},
@@ -46,19 +46,22 @@ def run():
 def test_a_pose_is_reached_and_told(run):
     """And what the swarm covers is told at every tick."""
     told = []
-    run.observer.create_subscription(SwarmStatus, "/swarm_status", told.append, STATUS)
+    run.observer.create_subscription(Report, "/report", told.append, STATUS)
     goal = np.array(VALUES["goal"])
     state = run.reach(goal)
     assert state is not None and state.error_code == 0 and state.system == "swarm", state.reason
     assert state.progress == 1.0 and state.state == JobState.IDLE
     off = run.observer.trace.object[-1] - goal
     assert np.hypot(*off[:2]) < 0.03 and abs(math.remainder(off[2], 2.0 * math.pi)) < 0.06
-    assert {m.phase for m in told} >= {"go round", "push"} and len(told) > 500
+    assert {m.phase for m in told} >= {"go round", "push"} and len(told) > 100
     for m in told[:: len(told) // 20]:
-        assert len(m.robots) == len(m.centroid_x) == 8 and not m.dead
-        density = density_from_ros(m)
-        assert density.at(density.means).min() > 0.0 and m.solve_time < 1.0
-        assert m.target_theta == pytest.approx(1.0) and math.isfinite(m.position_error)
+        report = report_from_ros(m)
+        assert report.figure("taking part") == 8 and report.figure("not moving") == 0
+        layers = [s.layer for s in report.shapes]
+        assert layers.count("cells") == 8 and {"region", "density", "centroids"} <= set(layers)
+        (centroids,) = [s for s in report.shapes if s.layer == "centroids"]
+        assert len(centroids.points) == 8 and m.solve_time < 1.0
+        assert math.isfinite(report.figure("to the target"))
 
 
 def move(run, x, y, theta=(), limit=400.0, feedback=None):
@@ -164,11 +167,12 @@ def test_the_rest_finish_when_robots_die_and_leave():
     with running(events=events) as run:
         run.start()
         told = []
-        run.observer.create_subscription(SwarmStatus, "/swarm_status", told.append, STATUS)
+        run.observer.create_subscription(Report, "/report", told.append, STATUS)
         state = run.reach(np.array(VALUES["goal"]), 300.0)
         assert state is not None and state.error_code == 0, state.reason
-        assert {len(m.robots) for m in told} >= {8, 7}
-        assert any({"e1", "e2"} & set(m.dead) for m in told)
+        reports = [report_from_ros(m) for m in told]
+        assert {r.figure("taking part") for r in reports} >= {8, 7}
+        assert any(r.figure("not moving") > 0 for r in reports)
 
 
 def decentralised(**agents):

@@ -44,7 +44,7 @@ def test_when_the_object_is_not_seen_all_stand_and_go_on_when_it_is():
         blind = [speed for when, speed in told if 12.4 < when < 15.9]
         before = [speed for when, speed in told if 11.0 < when < 12.0]
         assert len(blind) > 300 and max(blind) == 0.0 and min(before) > 0.0
-        assert not run.supervisor.job.dead
+        assert not run.supervisor.method.job.dead
 
 
 def test_a_robot_that_is_not_seen_stands_and_the_others_go_on():
@@ -54,7 +54,7 @@ def test_a_robot_that_is_not_seen_stands_and_the_others_go_on():
         run.start()
         state = run.reach(GOAL, 300.0)
         assert state is not None and state.error_code == 0, state and state.reason
-        assert not {"e1", "e2"} & set(run.supervisor.job.taking_part)
+        assert not {"e1", "e2"} & set(run.supervisor.method.job.taking_part)
 
 
 def test_an_object_that_somebody_moves_is_brought_all_the_same():
@@ -124,7 +124,7 @@ def test_a_flood_of_goals_ends_with_the_last_one_and_a_cancel_ends_it(run):
     for goal in (*goals, goals[-1], goals[-1]):
         run.observer.send_goal(goal)
     pushing(run)
-    job, target = run.observer.state.job, run.supervisor.job.target
+    job, target = run.observer.state.job, run.supervisor.method.job.target
     assert target == pytest.approx(goals[-1])
     run.observer.send_goal(goals[-1])
     run.spin_until(lambda: False, 0.5)

@@ -19,7 +19,7 @@ from push_model.settings import SettingsError
 from push_scenario.bodies import load_object
 from push_study.pool import Row
 from push_study.study import StudyOptions
-from push_study.swarm_map import MAPS, MapTask, load_map
+from push_study.swarm.maps import MAPS, MapTask, load_map
 
 OBJECTS = ("square", "circle", "rectangle", "triangle", "plus", "l", "h")
 ROBOTS = 20

@@ -15,8 +15,8 @@ import numpy as np
 from push_scenario.bodies import load_object
 from push_study.pool import Row
 from push_study.study import StudyOptions
-from push_study.swarm_figures import draw_figures
-from push_study.swarm_run import SIMULATION, SwarmTask, draw_ways, length
+from push_study.swarm.figures import draw_figures
+from push_study.swarm.targets import SIMULATION, SwarmTask, draw_ways, length
 
 SHAPES = ("swarm_ellipse", "swarm_octagon", "swarm_rectangle", "swarm_flower")
 """Objects, where none are named."""

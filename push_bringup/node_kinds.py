@@ -1,0 +1,199 @@
+"""The kinds of nodes: a row each, with the module that runs it, how it is made, and its settings.
+
+A method that an installed package or a script adds is no row here: ``kind_of`` makes its row from
+its ``MethodSpec``.
+"""
+
+import importlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from grasp_opt.group_method import GROUP
+from grasp_opt.placement import PlacementSettings
+from grasp_opt.step_planner import StepSettings
+from push_estimation.pose_gate import PoseGateSettings
+from push_job.method import MethodSpec, method_names, method_spec
+from push_model.settings import SettingsError
+from push_mpc.settings import ControllerSettings, MpcSettings, TrackerSettings
+from push_mpc.torque_tracker import TorqueTrackerSettings
+from push_mpc.wheel_slip_nmpc import WheelSlipSettings
+from push_planner import PlannerSettings
+from push_supervisor import SupervisorSettings
+from sim_bridge.settings import BridgeSettings, MotionCaptureSettings, PhysicsSettings
+from swarm_push.swarm_method import SWARM
+
+if TYPE_CHECKING:
+    from push_bringup.systems import NodeSpec
+
+METHOD_MODULE = "push_ros.method_node"
+"""The module whose ``main`` runs any method in a process of its own."""
+
+
+@dataclass(frozen=True)
+class NodeKind:
+    """A kind of node.
+
+    module: whose ``main`` runs it. maker: the callable of that module that makes it in this
+    process. passes: keyword arguments of the maker, from a NodeSpec. takes: ROS parameters that say
+    whom it serves. sections: classes of its settings by section; "" is its own level. owner:
+    whether it owns the jobs of a team. commands: whether it commands all robots of its team.
+    listens: subscriptions of the pose stream that a run in lockstep waits for.
+    """
+
+    module: str
+    maker: str
+    passes: Callable[["NodeSpec"], dict[str, Any]]
+    takes: tuple[str, ...] = ()
+    sections: Mapping[str, type[Any]] = field(default_factory=dict)
+    owner: bool = False
+    commands: bool = False
+    listens: int = 0
+
+    def make(self, spec: "NodeSpec", scenario: Any) -> Any:
+        """The node in this process."""
+        maker = getattr(importlib.import_module(self.module), self.maker)
+        return maker(scenario=scenario, **self.passes(spec))
+
+
+def _team(spec: "NodeSpec") -> dict[str, Any]:
+    return {
+        "robots": spec.robots,
+        "item": spec.item,
+        "namespace": spec.namespace,
+        "world": spec.world,
+    }
+
+
+def _robot(spec: "NodeSpec") -> dict[str, Any]:
+    return {"robot": spec.robot, "namespace": spec.world}
+
+
+def _method_kind(spec: MethodSpec, name: str) -> NodeKind:
+    """Of a method that is hosted as it is; name: by which it is found again in a process."""
+    return NodeKind(
+        METHOD_MODULE,
+        "MethodNode",
+        lambda node: {"spec": name, **_team(node)},
+        ("world", "robots", "object", "method"),
+        {**spec.sections, "poses": PoseGateSettings},
+        owner=True,
+        commands=True,
+        listens=1,
+    )
+
+
+_TEAM = ("world", "robots", "object")
+_GATED = {"poses": PoseGateSettings}
+
+KINDS: dict[str, NodeKind] = {
+    "bridge": NodeKind(
+        "sim_bridge.node",
+        "BridgeNode",
+        lambda s: {"autostart": False, "namespace": s.namespace},
+        sections={
+            "": BridgeSettings,
+            "motion_capture": MotionCaptureSettings,
+            "physics": PhysicsSettings,
+        },
+    ),
+    "planner": NodeKind(
+        "push_planner.node",
+        "PlannerNode",
+        lambda s: {"namespace": s.namespace, "world": s.world},
+        ("world",),
+        {"": PlannerSettings},
+    ),
+    "controller": NodeKind(
+        "push_mpc.node",
+        "ControllerNode",
+        _robot,
+        ("robot",),
+        {"": ControllerSettings, "mpc": MpcSettings, "tracker": TrackerSettings, **_GATED},
+        listens=1,
+    ),
+    "supervisor": NodeKind(
+        "push_supervisor.node",
+        "SupervisorNode",
+        lambda s: {
+            "robot": s.robot,
+            "item": s.item,
+            "namespace": s.namespace,
+            "world": s.world,
+        },
+        ("world", "robot", "object"),
+        {"": SupervisorSettings, **_GATED},
+        owner=True,
+        listens=1,
+    ),
+    "group": NodeKind(
+        "grasp_opt.node",
+        "make",
+        _team,
+        _TEAM,
+        {**GROUP.sections, **_GATED},
+        owner=True,
+        commands=True,
+        listens=1,
+    ),
+    "optimizer": NodeKind(
+        "grasp_opt.optimizer_node",
+        "OptimizerNode",
+        _team,
+        _TEAM,
+        {"": StepSettings, "placement": PlacementSettings},
+    ),
+    "swarm": NodeKind(
+        "swarm_push.node",
+        "make",
+        _team,
+        _TEAM,
+        {**SWARM.sections, **_GATED},
+        owner=True,
+        commands=True,
+        listens=1,
+    ),
+    "swarm_agent": NodeKind(
+        "swarm_push.agent_node",
+        "SwarmAgentNode",
+        lambda s: {"robot": s.robot, **_team(s)},
+        ("world", "robot", "robots", "object"),
+        listens=1,
+    ),
+    "torque_controller": NodeKind(
+        "push_mpc.torque_node",
+        "TorqueControllerNode",
+        _robot,
+        ("robot",),
+        {"nmpc": WheelSlipSettings, "tracker": TorqueTrackerSettings, **_GATED},
+        listens=1,
+    ),
+    "recorder": NodeKind(
+        "push_record.recorder", "RecorderNode", lambda s: {"world": s.world}, ("world",)
+    ),
+}
+"""By name, which is also the node's key among the ``parameters`` of a scenario."""
+
+MODULES = {name: kind.module for name, kind in KINDS.items()} | {"method": METHOD_MODULE}
+"""Name of a node on the command line to the module whose ``main`` runs it."""
+
+SECTIONS = {name: dict(kind.sections) for name, kind in KINDS.items() if kind.sections}
+"""Settings classes of the nodes that have settings, by section."""
+
+
+@cache
+def kind_of(name: str) -> NodeKind:
+    """A kind of node: one of ``KINDS``, or a method by its name or ``module:ATTRIBUTE``.
+
+    Raises
+    ------
+    SettingsError: there is none of the name.
+    """
+    if name in KINDS:
+        return KINDS[name]
+    spec = method_spec(name)
+    if spec is None:
+        known = ", ".join(dict.fromkeys((*KINDS, *method_names())))
+        raise SettingsError(f"unknown node '{name}'; expected one of: {known}")
+    return _method_kind(spec, name)

@@ -1,0 +1,383 @@
+"""The node that hosts a method: frames of the pose stream in, commands and reports out.
+
+It knows no method: whatever implements ``push_job.method.Method`` runs here, one task at a time.
+Every frame is answered with one message for all robots of the team.
+"""
+
+import math
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from std_msgs.msg import Header
+
+from push_estimation.pose_gate import PoseGateSettings, Stamp
+from push_job.method import (
+    Arena,
+    Method,
+    MethodSpec,
+    Refusal,
+    Seen,
+    Task,
+    Unsuited,
+    method_names,
+    method_spec,
+)
+from push_job.report import Status
+from push_model.arrays import Array
+from push_model.drives import HolonomicDrive
+from push_model.jobs import GoalRefused, JobError, JobPhase
+from push_model.occupancy import OccupancyGrid as Grid
+from push_model.settings import SettingsError
+from push_msgs.action import MoveObject
+from push_msgs.msg import Report as ReportMessage
+from push_ros.belief_feed import BeliefFeed
+from push_ros.commander import Commander, TeamCommander
+from push_ros.diagnostics import Diagnostics
+from push_ros.job_intake import JobIntake
+from push_ros.map_feed import MapFeed
+from push_ros.names import names_of
+from push_ros.parameters import declare_settings
+from push_ros.pose_feed import Frame, PoseFeed
+from push_ros.process import run_node
+from push_ros.qos import STATUS
+from push_ros.report_conversions import report_to_ros
+from push_ros.task_server import TaskAction, TaskServer
+from push_scenario.scenario import Scenario, load_scenario
+
+PATIENCE = 10.0  # [s] without poses of the object after which a task ends
+_REPORTS = 0.05  # [s] of pose time between reports
+_WAITING = Status(int(JobPhase.IDLE), "IDLE", "waiting for a map")
+
+
+@dataclass(frozen=True)
+class Hosting:
+    """What a package adds to the node of its method.
+
+    actions: further actions, made from the node. commander: in the place of the one that sends
+    velocities to all robots. attach: called with the node when it is made, e.g. for clients of
+    other nodes; its result becomes the ``partners`` of the arena.
+    """
+
+    actions: Callable[["MethodNode"], Sequence[TaskAction]] = lambda node: ()
+    commander: Callable[["MethodNode"], Commander | None] = lambda node: None
+    attach: Callable[["MethodNode"], Any] = lambda node: None
+
+
+class MethodNode(Node):
+    """Robots of one type, one object, one method, one task at a time.
+
+    robots, object: names. method: None where there is none for the map, or no map yet.
+    """
+
+    def __init__(
+        self,
+        spec: MethodSpec | str = "",
+        scenario: Scenario | None = None,
+        robots: tuple[str, ...] = (),
+        item: str = "",
+        namespace: str = "",
+        world: str = "",
+        hosting: Hosting | None = None,
+    ) -> None:
+        """spec: the method, or its name; the parameter ``method`` where it is empty. robots, item:
+        the team's. namespace: the team's; world: the bridge's, where it is another one."""
+        chosen = spec if isinstance(spec, MethodSpec) else _chosen(spec) if spec else None
+        kind = chosen.name if chosen is not None else "method"
+        super().__init__(kind.replace("-", "_"), namespace=namespace)
+        given_name = kind if isinstance(spec, MethodSpec) else spec
+        name = str(self.declare_parameter("method", given_name).value)
+        if chosen is None:
+            chosen = _chosen(name)
+        self.spec, self._key, hosting = chosen, name, hosting or Hosting()
+        self.names = names = names_of(self, world)
+        file = self.declare_parameter("scenario", chosen.example).value
+        self.scenario = scenario = scenario or load_scenario(str(file))
+        given = self.declare_parameter("robots", list(robots) or [""]).value
+        self.robots = tuple(r for r in given if r) or tuple(scenario.robots)
+        given_item = str(self.declare_parameter("object", item).value)
+        self.robot_specs = {n: scenario.robot(n)[1] for n in self.robots}
+        self.object, self.item = scenario.object(given_item)
+        chosen.check(self.robot_specs, self.item)
+        self._others = {
+            k: r for k, r in scenario.radii.items() if k not in (*self.robots, self.object)
+        }
+        self.settings, gate = self._declare(chosen, scenario)
+        self.method: Method | None = None
+        self._why_not = "there is no map yet"
+        self._grid: Grid | None = None
+        self._seen: Seen | None = None
+        self._missing = 0.0  # [s] of pose time without the object
+        self._told: Status | None = None
+        self._stamp, self._reported = Header().stamp, -math.inf
+        self.planning_time = 0.0
+        """[s] CPU time that the method's planning has taken so far."""
+        self._diagnostics = Diagnostics(self, names, self._state)
+        self.beliefs = BeliefFeed(self, names, scenario, self._diagnostics)
+        self.partners = hosting.attach(self)
+        holonomic = isinstance(self.robot_specs[self.robots[0]].drive, HolonomicDrive)
+        self._commander = hosting.commander(self) or TeamCommander(
+            self, names, self.robots, holonomic
+        )
+        self._reports = self.create_publisher(ReportMessage, names.team("report"), STATUS)
+        bodies = [*self.robots, self.object, *self._others]
+        self._poses = PoseFeed(self, names, gate, bodies, self._diagnostics, self._on_frame)
+        self._intake = JobIntake(
+            self, names, self._diagnostics, self, chosen.name, list(self.robots), self.object
+        )
+        self._servers = [
+            TaskServer(self, names.team(a.name), a, self, self._diagnostics.refuse)
+            for a in hosting.actions(self)
+        ]
+        MapFeed(self, names, self._diagnostics, self._take_map)
+        self._watchdog = self.create_timer(
+            0.1, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
+        self._waiting = self._poses.clock.now  # since when the object is not seen
+        self._look_after_task()
+
+    def _declare(
+        self, spec: MethodSpec, scenario: Scenario
+    ) -> tuple[dict[str, Any], PoseGateSettings]:
+        values = dict(scenario.parameters.get(self._key, {}))
+        sections = {k: values.pop(k, {}) for k in (*spec.sections, "poses") if k}
+        made = {
+            k: declare_settings(self, cls, sections[k], k, f"{spec.name}.{k}")
+            for k, cls in spec.sections.items()
+            if k
+        }
+        if "" in spec.sections:
+            made[""] = declare_settings(self, spec.sections[""], values, where=spec.name)
+        elif values:
+            raise SettingsError(f"{spec.name}: unknown key '{next(iter(values))}'")
+        gate = declare_settings(
+            self, PoseGateSettings, sections["poses"], "poses", f"{spec.name}.poses"
+        )
+        return made, gate
+
+    @property
+    def ready(self) -> bool:
+        """Whether a task could be worked on."""
+        return self._grid is not None and bool(getattr(self.partners, "ready", True))
+
+    @property
+    def seen(self) -> Seen | None:
+        """What the last frame showed, of the object and the team."""
+        return self._seen
+
+    # The owner of the job, see JobOwner
+
+    @property
+    def status(self) -> Status:
+        """How the task stands."""
+        return self.method.status if self.method is not None else _WAITING
+
+    @property
+    def busy(self) -> bool:
+        """See JobOwner."""
+        return self.status.phase != JobPhase.IDLE
+
+    @property
+    def plan_ready(self) -> bool:
+        """See JobOwner; a method plans as it goes."""
+        return False
+
+    def execute(self) -> None:
+        """See JobOwner; there is never a plan that waits."""
+
+    def check_goal(self, goal: Array) -> None:
+        """See JobOwner."""
+        self.check_task(self._task(goal))
+
+    def take_goal(self, goal: Array, plan_only: bool) -> None:
+        """See JobOwner."""
+        self.take_task(self._task(goal))
+        if plan_only:
+            text = f"the method '{self.spec.name}' plans as it goes; it makes no plan that waits"
+            self.end_job(JobError.INVALID_GOAL, text)
+
+    def _task(self, goal: Array) -> Task:
+        own = self.settings.get("")
+        turned = bool(getattr(own, "orientation", True))
+        return Task((goal if turned else np.array([*goal[:2], math.nan]),))
+
+    def end_job(self, code: JobError, message: str) -> None:
+        """See JobOwner."""
+        if self.method is not None:
+            self.method.end(code, message)
+        self._look_after_task()
+
+    # The host of tasks, see TaskHost
+
+    def check_task(self, task: Task) -> None:
+        """See TaskHost."""
+        if self._grid is None:
+            return  # it is found out when the map comes
+        if self.method is None:
+            raise GoalRefused(JobError.PLANNING_FAILED, self._why_not)
+        for target in task.targets:
+            if not self._grid.contains(float(target[0]), float(target[1])):
+                raise GoalRefused(JobError.OUTSIDE_MAP, "the goal is outside the map")
+        found = self.method.assess(task, self.beliefs.current, self._seen)
+        if isinstance(found, Refusal):
+            raise GoalRefused(found.code, found.reason)
+
+    def take_task(self, task: Task) -> None:
+        """See TaskHost."""
+        self._waiting, self._missing = self._poses.clock.now, 0.0
+        if self.method is not None:
+            self.method.begin(task, self.beliefs.current)
+        self._look_after_task()
+
+    # The world
+
+    def _take_map(self, grid: Grid) -> None:
+        self.end_job(JobError.PREEMPTED, "the map has changed")
+        self._grid = grid
+        arena = Arena(grid, self.robot_specs, self.object, self.item, self.settings, self.partners)
+        try:
+            self.method = self.spec.make(arena)
+        except Unsuited as error:
+            self.method, self._why_not = None, str(error)
+        self._look_after_task()
+
+    def _on_frame(self, frame: Frame) -> None:
+        self._stamp = frame.stamp
+        commands: Mapping[str, tuple[float, float]] = {}
+        if frame.verdict is Stamp.RESET:
+            self._reported = -math.inf
+            if self.method is not None:
+                self.method.revive()
+            self.end_job(JobError.CLOCK_RESET, "the clock went back")
+        elif frame.verdict is not Stamp.REFUSED:
+            commands = self._step(frame)
+        self._commander.send(self._stamp, commands)
+        self._look_after_task()
+
+    def _step(self, frame: Frame) -> Mapping[str, tuple[float, float]]:
+        """Commands by name; robots without one stand."""
+        method, item = self.method, self._poses.pose(self.object)
+        if item is None:
+            self._missing += frame.elapsed
+            if self._missing > PATIENCE:
+                self.end_job(JobError.POSES_STALE, f"no poses of '{self.object}'")
+            return {}
+        self._missing, self._waiting = 0.0, self._poses.clock.now
+        robots = {n: p for n in self.robots if (p := self._poses.pose(n)) is not None}
+        self._seen = seen = Seen(self._poses.stamp, item, robots, self._poses.discs(self._others))
+        if method is None or not self.busy:
+            return {}
+        began = time.thread_time()
+        told = method.step(seen, self.beliefs.current)
+        cost = time.thread_time() - began
+        self.planning_time += told.planning
+        if seen.time - self._reported >= _REPORTS - 1e-9:
+            self._report(method, seen, cost)
+        return told.commands
+
+    def _report(self, method: Method, seen: Seen, cost: float) -> None:
+        report = method.report(seen)
+        if report is None:
+            return
+        self._reported = seen.time
+        message = report_to_ros(report, self._stamp, self.spec.name, self.object)
+        message.solve_time = cost
+        self._reports.publish(message)
+
+    def _on_watchdog(self) -> None:
+        """For when no frame comes; in lockstep, where the world waits, nothing happens."""
+        now = self._poses.clock.now
+        if not self.busy:
+            self._waiting = now
+        elif now - self._waiting > PATIENCE and self._poses.silence > PATIENCE:
+            self.end_job(JobError.POSES_STALE, "no poses arrive")
+
+    # Outputs
+
+    def _look_after_task(self) -> None:
+        """Tell how the task stands, and that it has ended."""
+        status, before = self.status, self._told
+        if status == before:
+            return
+        ended = before is not None and before.phase != JobPhase.IDLE
+        self._told = status
+        self._publish_status(status)
+        if ended and not self.busy:
+            self._finish(status)
+
+    def _publish_status(self, status: Status) -> None:
+        self._intake.publish(
+            self._poses.stamp,
+            state=int(status.phase),
+            state_name=status.name,
+            reason=status.reason,
+            error_code=int(status.code),
+            progress=float(status.progress),
+            step_index=int(status.index),
+            step_count=int(status.count),
+            replans=int(status.replans),
+        )
+        self.get_logger().info(f"{status.name}: {status.reason}")
+        if self.busy:
+            away, _ = self._errors()
+            told = MoveObject.Feedback(state=int(status.phase), state_name=status.name)
+            told.push_index, told.push_count = int(status.index), int(status.count)
+            told.distance_to_goal = away
+            self._intake.feedback(told)
+            for server in self._servers:
+                server.feedback(status, away)
+
+    def _finish(self, status: Status) -> None:
+        away, turned = self._errors()
+        common = {
+            "error_code": int(status.code),
+            "error_msg": "" if status.code == JobError.NONE else status.reason,
+            "position_error": away,
+            "orientation_error": turned,
+        }
+        for server in self._servers:
+            server.finish(common, status)
+        if self._intake.waited_for:
+            done = {"pushes": int(status.pushes), "replans": int(status.replans)}
+            self._intake.finish(MoveObject.Result(**done, **common))
+
+    def _errors(self) -> tuple[float, float]:
+        if self.method is None or self._seen is None:
+            return math.inf, math.inf
+        return self.method.errors(self._seen)
+
+    def _state(self) -> dict[str, Any]:
+        status = self.status
+        seen = sum(self._poses.pose(n) is not None for n in self.robots)
+        return {
+            "method": self.spec.name,
+            "state": status.name,
+            "reason": status.reason,
+            "error code": int(status.code),
+            "robots": f"{seen} of {len(self.robots)} seen",
+            **(self.method.facts() if self.method is not None else {}),
+            "poses refused": self._poses.gate.refused,
+            "warning": "no poses" if self._poses.pose(self.object) is None else "",
+        }
+
+
+def _chosen(name: str) -> MethodSpec:
+    spec = method_spec(name)
+    if spec is None:
+        known = ", ".join(method_names())
+        raise SettingsError(f"no method called '{name}'; expected one of: {known}, or MODULE:NAME")
+    return spec
+
+
+def main() -> int:
+    """Entry point of the process: ``--ros-args -p method:=NAME`` on its command line."""
+    return run_node(MethodNode)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

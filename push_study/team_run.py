@@ -1,0 +1,264 @@
+"""One run of a team by any method: the whole graph in lockstep, as users run it.
+
+Motion capture with its noise, rate and latency, disturbances, the node of the method and the door
+at which tasks are refused are those of live use. Nothing here moves a robot.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from rclpy.node import Node
+
+from push_job.method import Task
+from push_model import se2
+from push_model.arrays import Array
+from push_model.jobs import GoalRefused, JobError
+from push_model.settings import SettingsError
+from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
+from push_msgs.msg import Contacts, Poses, Report
+from push_ros.claims import own_domain
+from push_ros.conversions import poses_from_ros, time_from_ros
+from push_ros.method_node import MethodNode
+from push_ros.names import Names
+from push_ros.qos import STATUS, STREAM
+from push_scenario.scenario import Scenario
+from push_study.graph_run import LockstepRun
+from push_study.pool import Row
+from push_study.uncertainty import Uncertainty
+
+OBJECT = "object"
+"""The name of the object in a made scenario."""
+TRACE = 0.2
+"""[s] between poses that are kept."""
+
+
+def made_scenario(
+    name: str,
+    environment: EnvironmentSpec,
+    robot: RobotSpec,
+    starts: Array,
+    item: ObjectSpec,
+    start: Array,
+    parameters: Mapping[str, Mapping[str, object]] | None = None,
+) -> Scenario:
+    """A scenario with robots ``e0, e1, …`` of one type at poses ``(n, 3)``, and an object at a pose
+    ``(3,)`` of its geometric frame.
+
+    Raises
+    ------
+    SettingsError: bodies that stand in walls or in each other.
+    """
+    scenario = Scenario(
+        name,
+        environment,
+        {f"e{i}": (robot, np.array(pose)) for i, pose in enumerate(starts)},
+        {OBJECT: (item, np.array(start))},
+        {k: dict(v) for k, v in (parameters or {}).items()},
+    )
+    scenario.check(name)
+    return scenario
+
+
+@dataclass
+class TeamTrace:
+    """What was seen from ground truth.
+
+    ways ``(t, 1 + n, 3)``: poses of object and robots, every ``TRACE`` seconds; phases: [s] of each
+    phase that the method reported; figures: values of its figures by name, at every report;
+    collision_ticks: ticks in which robots touched each other, or anything a wall.
+    """
+
+    times: list[float] = field(default_factory=list)
+    ways: list[Array] = field(default_factory=list)
+    phases: dict[str, float] = field(default_factory=dict)
+    figures: dict[str, list[float]] = field(default_factory=dict)
+    forces: list[Array] = field(default_factory=list)
+    collision_ticks: int = 0
+    now: Array = field(default_factory=lambda: np.zeros((0, 3)))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a task.
+
+    reached: targets; code, reason: of the end; seconds: of simulation, which stands still while a
+    plan is made; planning: [s] CPU time of that; error: [m], [rad] of the object from the goal at
+    the end, from ground truth. drawn: what of the world was not as believed.
+    """
+
+    reached: int
+    code: JobError
+    reason: str
+    seconds: float
+    planning: float
+    error: tuple[float, float]
+    trace: TeamTrace
+    drawn: Row
+
+    @property
+    def success(self) -> bool:
+        """Whether the method said that it is done."""
+        return self.code is JobError.NONE
+
+    @property
+    def charged(self) -> float:
+        """[s] of simulation and planning together: what a user waits."""
+        return self.seconds + self.planning
+
+    def row(self) -> Row:
+        """The measures that every study of a team has."""
+        return {
+            "reason": "" if self.success else self.reason,
+            "position_error_m": self.error[0],
+            "orientation_error_rad": self.error[1],
+            "duration_s": self.seconds,
+            "planning_cpu_s": self.planning,
+            "charged_s": self.charged,
+            "collision_ticks": self.trace.collision_ticks,
+            **self.drawn,
+        }
+
+
+class TeamObserver(Node):
+    """Watches a team from ground truth. For evaluation only."""
+
+    def __init__(
+        self,
+        names: Names,
+        robots: Sequence[str],
+        meanwhile: Callable[[float, Array], None] | None = None,
+    ) -> None:
+        """meanwhile: called with the time [s] and poses ``(1 + n, 3)`` of object and robots."""
+        super().__init__("team_observer")
+        self._names, self._robots = (OBJECT, *robots), tuple(robots)
+        self._meanwhile, self._last, self._reported = meanwhile, -math.inf, math.nan
+        self._phase = ""
+        self.trace = TeamTrace()
+        self.recording = False
+        self.create_subscription(Poses, names.world("ground_truth/poses"), self._on_truth, STREAM)
+        self.create_subscription(Contacts, names.world("contacts"), self._on_contacts, STREAM)
+        self.create_subscription(Report, names.team("report"), self._on_report, STATUS)
+
+    def _on_truth(self, message: Poses) -> None:
+        poses, _ = poses_from_ros(message, self._names)
+        if OBJECT not in poses:
+            return
+        gone = np.full(3, np.nan)
+        table = np.array([poses.get(n, gone) for n in self._names])
+        self.trace.now = table
+        time = time_from_ros(message.header.stamp)
+        if not self.recording:
+            return
+        if time - self._last >= TRACE - 1e-9:
+            self._last = time
+            self.trace.times.append(time)
+            self.trace.ways.append(table)
+        if self._meanwhile is not None:
+            self._meanwhile(time, table)
+
+    def _on_contacts(self, message: Contacts) -> None:
+        if not self.recording:
+            return
+        forces, hit = np.zeros(len(self._robots)), False
+        for k, (a, b) in enumerate(zip(message.body_a, message.body_b, strict=True)):
+            other = b if a == OBJECT else a
+            if OBJECT in (a, b) and other in self._robots:
+                size = math.hypot(message.force_x[k], message.force_y[k])
+                forces[self._robots.index(other)] += size
+            else:
+                hit = True
+        self.trace.forces.append(forces)
+        self.trace.collision_ticks += hit
+
+    def _on_report(self, message: Report) -> None:
+        time = time_from_ros(message.header.stamp)
+        if self._phase and 0.0 < time - self._reported < 1.0:
+            spent = self.trace.phases.get(self._phase, 0.0) + time - self._reported
+            self.trace.phases[self._phase] = spent
+        self._phase, self._reported = str(message.phase), time
+        for name, value in zip(message.figures, message.values, strict=True):
+            self.trace.figures.setdefault(str(name), []).append(float(value))
+
+
+def run_team(
+    system: str,
+    believed: Scenario,
+    task: Task,
+    doubt: Uncertainty,
+    seed: int,
+    limit: float,
+    meanwhile: Callable[[LockstepRun, float, Array], None] | None = None,
+    world: str = "",
+) -> Outcome:
+    """Give a team a task and wait for its end, in a ROS domain of its own.
+
+    Parameters
+    ----------
+    system: whose nodes run, see ``push_bringup.systems``. believed: the scenario of the method; the
+        world is drawn from it. limit: [s] of simulation.
+    meanwhile: called at every tick with the run, the time [s] and poses of object and robots.
+    world: kind of world, that of the scenario where it is empty.
+    """
+    if world:
+        believed = believed.settings("bridge", world=world)
+    believed, actual, drawn = doubt.draw(believed, seed)
+    with own_domain():
+        return _run(system, believed, actual, task, limit, meanwhile, drawn)
+
+
+def _run(
+    system: str,
+    believed: Scenario,
+    actual: Scenario,
+    task: Task,
+    limit: float,
+    meanwhile: Callable[[LockstepRun, float, Array], None] | None,
+    drawn: Row,
+) -> Outcome:
+    watchers: list[TeamObserver] = []
+
+    def observer() -> list[Node]:
+        made = TeamObserver(
+            Names("/", "/"),
+            list(believed.robots),
+            None if meanwhile is None else lambda t, p: meanwhile(run, t, p),
+        )
+        watchers.append(made)
+        return [made]
+
+    with LockstepRun(believed, observer, world=actual, quiet=True, system=system) as run:
+        run.start()
+        node, watcher = run.supervisor, watchers[0]
+        if not isinstance(node, MethodNode):
+            raise SettingsError(f"the system '{system}' hosts no method")
+        run.spin_until(lambda: len(watcher.trace.now) > 0 and node.seen is not None, 5.0)
+        begin = run.bridge.time
+        watcher.recording = True
+        try:
+            node.check_task(task)
+        except GoalRefused as refusal:
+            error = _errors(watcher.trace.now[0], task.goal)
+            return Outcome(
+                0, refusal.code, f"refused: {refusal}", 0.0, 0.0, error, watcher.trace, drawn
+            )
+        node.take_task(task)
+        ended = run.spin_until(lambda: not node.busy, limit, math.inf)
+        seconds = run.bridge.time - begin
+        planner = run.planner
+        planning = node.planning_time + float(getattr(planner, "planning_time", 0.0)) * (
+            planner is not node
+        )
+        status = node.status
+        code = JobError(status.code) if ended else JobError.EXECUTION_FAILED
+        reason = status.reason if ended else f"no end within {limit:.0f} s: {status.reason}"
+        count = len(task.targets)
+        reached = count if code is JobError.NONE else min(status.index, count)
+        error = _errors(watcher.trace.now[0], task.goal)
+        return Outcome(reached, code, reason, seconds, planning, error, watcher.trace, drawn)
+
+
+def _errors(pose: Array, goal: Array) -> tuple[float, float]:
+    turn = 0.0 if math.isnan(goal[2]) else abs(se2.wrap(float(pose[2] - goal[2])))
+    return math.hypot(pose[0] - goal[0], pose[1] - goal[1]), turn

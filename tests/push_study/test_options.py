@@ -1,0 +1,226 @@
+"""What a summary says was applied, and nothing else: FAULTS row 29."""
+
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import binomtest, fisher_exact, ranksums
+
+from planar_push.main import main
+from push_model.settings import SettingsError
+from push_study.experiments import grasp_selection, grasp_study, group_goals
+from push_study.study import StudyOptions, experiment, experiment_names, run_study, statistics_of
+from push_study.summary import aggregate, by_cell, known
+from push_study.uncertainty import UNCERTAINTIES
+from sim_bridge.worlds import world_kind
+
+NAMES = experiment_names()
+
+
+def tasks(name, tmp_path, **changes):
+    """The fields of the tasks of a small study."""
+    what = experiment(name)
+    options = StudyOptions(what.SCENARIOS[:1], 1, 1, tmp_path, **changes)
+    return [dataclasses.asdict(task) for task in what.tasks(options)]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_experiment_declares_exactly_the_options_that_reach_its_trials(name, tmp_path):
+    declared = experiment(name).OPTIONS
+    assert set(declared) <= {"uncertainty", "world"}
+    assert declared.get("uncertainty", "mild") in UNCERTAINTIES
+    if "world" in declared:
+        world_kind(declared["world"])
+    for option, values in (("uncertainty", ("none", "hard")), ("world", ("planar", "pybullet"))):
+        first, second = (tasks(name, tmp_path, **{option: value}) for value in values)
+        assert (first != second) == (option in declared), option
+
+
+@pytest.mark.parametrize("name", [n for n in NAMES if "world" in experiment(n).OPTIONS])
+def test_the_world_that_is_declared_is_the_one_that_is_taken(name, tmp_path):
+    world = experiment(name).OPTIONS["world"]
+    assert tasks(name, tmp_path) == tasks(name, tmp_path, world=world)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("option", ["uncertainty", "world"])
+def test_an_option_that_is_not_used_is_refused_by_name(name, option, tmp_path, capsys):
+    if option in experiment(name).OPTIONS:
+        return
+    value = {"uncertainty": "mild", "world": "planar"}[option]  # its default is refused, too
+    out = tmp_path / "out"
+    assert main(["experiment", name, f"--{option}", value, "--out", str(out)]) == 2
+    error = capsys.readouterr().err
+    assert f"{option}: '{name}' does not use it" in error and not out.exists()
+    changed = {"uncertainty": "hard", "world": "planar"}[option]
+    options = StudyOptions(experiment(name).SCENARIOS, 1, 1, out, **{option: changed})
+    with pytest.raises(SettingsError, match=f"{option}: '{name}' does not use it"):
+        run_study(name, options)
+
+
+class Toy:
+    """An experiment without a simulation."""
+
+    SCENARIOS = ("a",)
+
+    def __init__(self, options):
+        self.OPTIONS = options
+
+    @staticmethod
+    def tasks(options):
+        return [ToyTask(s, options.seed + k) for s in options.scenarios for k in range(3)]
+
+    trial = staticmethod(lambda task: toy_row(task))
+
+    @staticmethod
+    def statistics(rows):
+        return {"seeds": len({r["seed"] for r in rows}), "nothing": math.nan}
+
+    @staticmethod
+    def conclude(options, tasks, rows):
+        pass
+
+
+@dataclasses.dataclass(frozen=True)
+class ToyTask:
+    scenario: str
+    seed: int
+
+
+def toy_row(task):
+    return {
+        "scenario": task.scenario,
+        "seed": task.seed,
+        "success": True,
+        "reason": "",
+        "error_m": [0.1, math.nan, 0.3][task.seed % 3],
+    }
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({}, set()),
+        ({"uncertainty": "mild"}, {"uncertainty"}),
+        ({"uncertainty": "mild", "world": "planar"}, {"uncertainty", "world"}),
+    ],
+)
+def test_a_summary_names_what_was_applied_and_the_statistics(options, said, tmp_path, monkeypatch):
+    toy = Toy(options)
+    monkeypatch.setattr("push_study.study.experiment", lambda name: toy)
+    monkeypatch.setattr(
+        "push_study.study.run_trials", lambda trial, tasks, *rest: [trial(t) for t in tasks]
+    )
+    summary = run_study("toy", StudyOptions(("a",), 1, 3, tmp_path / "out"))
+    assert {"uncertainty", "world"} & set(summary) == said
+    assert all(summary[key] == options[key] for key in said)
+    written = json.loads(
+        (tmp_path / "out" / "summary.json").read_text(), parse_constant=pytest.fail
+    )
+    assert written == summary
+    total = written["aggregate"]
+    assert total["seeds"] == 3 and total["nothing"] is None
+    assert total["error_m"]["mean"] == pytest.approx(0.2)  # of those that are known
+    assert [r["error_m"] for r in written["trials"]] == [0.1, None, 0.3]
+
+
+def test_statistics_of_the_grasp_study_are_those_of_independent_tests():
+    random = np.random.default_rng(4)
+    rows = []
+    for k in range(200):
+        test, done = bool(random.random() < 0.5), False
+        done = bool(random.random() < (0.9 if test else 0.3))
+        row = {
+            c: float(random.normal()) for c in {**grasp_study.PRINTED, **grasp_study.OURS}.values()
+        }
+        row |= {"test": test, "success": done, "scenario": "a", "seed": k}
+        row |= {"displacement": float(random.exponential(1.0 + test)), "energy_n": float(k % 7)}
+        rows.append(row)
+    found = aggregate(rows, statistics_of(grasp_study, rows))
+    counts = [[0, 0], [0, 0]]
+    for r in rows:
+        counts[r["success"]][r["test"]] += 1
+    assert found["failed_where_test_passes"] == counts[0][1]
+    assert found["fisher_p"] == pytest.approx(fisher_exact(counts)[1])
+    slid = [[r["displacement"] for r in rows if r["test"] is t] for t in (True, False)]
+    assert found["ranksum_p"] == pytest.approx(ranksums(*slid).pvalue)
+    done = [r for r in rows if r["success"]]
+    for index, column in {**grasp_study.PRINTED, **grasp_study.OURS}.items():
+        r = np.corrcoef([d[column] for d in done], [d["energy_n"] for d in done])[0, 1]
+        assert found[f"correlation_{index}"]["r"] == pytest.approx(r)
+        assert f"cross_validated_{index}" in found
+
+
+def test_statistics_of_grasp_selection_are_sign_tests_of_its_pairs():
+    random, rows = np.random.default_rng(1), []
+    for seed in range(9):
+        for law in grasp_selection.LAWS:
+            for grasp in grasp_selection.GRASPS:
+                error = float(random.uniform(1.0, 2.0)) - 0.6 * (grasp == "selected")
+                row = {"scenario": "a", "seed": seed, "trajectory": "t", "grasp": grasp}
+                rows.append(row | {"law": law, "success": True, "position_error_m": error})
+    found = grasp_selection.statistics(rows)
+    for law in grasp_selection.LAWS:
+        of = {(r["seed"], r["grasp"]): r["position_error_m"] for r in rows if r["law"] == law}
+        nearer = sum(of[s, "selected"] < of[s, "random"] for s in range(9))
+        assert found[f"selected_nearer_{law}"] == nearer
+        expected = binomtest(nearer, 9).pvalue
+        assert found[f"sign_p_grasp_{law}"] == pytest.approx(expected)
+    assert found["pairs_of_laws"] == 18
+
+
+def test_means_by_cell_are_over_the_successes():
+    rows = [
+        {"law": "a", "robots": n, "success": ok, "lambda": value}
+        for n, ok, value in [(8, True, 1.0), (8, True, 2.0), (8, False, 90.0), (20, False, 7.0)]
+    ]
+    assert by_cell([*rows, {"success": False}], ("law", "robots"), ("lambda",)) == {
+        "trials_a_8": 3,
+        "successes_a_8": 2,
+        "lambda_a_8": 1.5,
+        "trials_a_20": 1,
+        "successes_a_20": 0,
+    }
+
+
+@pytest.mark.parametrize("name", [n for n in NAMES if n.startswith("swarm")])
+def test_lambda_of_every_swarm_study_is_in_its_aggregate(name):
+    what, rows = experiment(name), []
+    for k in range(4):
+        ratios = dict.fromkeys(("dead_over_alive", "moved_over_direct", "with_the_arc"), 1.0 + k)
+        row = {"scenario": "s", "robots": 8, "law": "crescent", "method": "m", "seed": k}
+        row |= {"item": "i", "turned": True, "success": k < 3, "lambda": 1.0 + k}
+        rows.append(row | {"duration_s": 10.0, "delta_s": 1.0} | ratios)
+    found = aggregate(rows, statistics_of(what, rows))
+    if name == "swarm-upsets":
+        assert found["dead_over_alive_median"] == 2.0
+    elif name not in ("swarm-maps", "swarm-decentralised"):  # which have no Lambda
+        (key,) = [k for k in found if k.startswith("lambda_")]
+        assert found[key] == pytest.approx(2.0)
+
+
+def test_a_statistic_does_not_hide_a_measure():
+    with pytest.raises(ValueError, match="error_m"):
+        aggregate([toy_row(ToyTask("a", 0))], {"error_m": 1.0})
+    assert known({"a": (np.float64(1.0), math.inf, np.int64(2))}) == {"a": [1.0, None, 2]}
+
+
+@pytest.mark.long
+def test_a_goal_that_is_reached_with_a_collision_is_no_success(tmp_path, monkeypatch):
+    """The same job twice; the second time something is said to have been touched in one tick."""
+    task = group_goals.GoalTask("open", 23, str(tmp_path), 3, 0, "planar", "none")
+    clean = group_goals.trial(task)
+    assert clean["success"] and clean["collision_ticks"] == 0 and clean["reason"] == ""
+    felt, ticks = group_goals.GroupWorld.felt, []
+
+    def once(self):
+        ticks.append(self.time)
+        return felt(self)[0], len(ticks) == 100
+
+    monkeypatch.setattr(group_goals.GroupWorld, "felt", once)
+    touched = group_goals.trial(task)
+    assert touched["position_error_m"] == clean["position_error_m"]
+    assert not touched["success"] and touched["collision_ticks"] == 1
+    assert "touched" in touched["reason"]

@@ -1,0 +1,178 @@
+"""A method that no package knows: this file. It runs as a node, in a study, on the page and in a
+bag, without an edit anywhere else.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from rclpy.node import Node
+
+from planar_push.main import main
+from push_bringup.preparation import prepare
+from push_bringup.systems import nodes_of
+from push_job.method import Certificate, MethodSpec, Refusal, Task, Told
+from push_job.report import Figure, Report, Status, polyline
+from push_model.jobs import JobError, JobPhase
+from push_model.settings import SettingsError, bounded, settings
+from push_record.contents import load
+from push_record.recorder import RecorderNode
+from push_ros.names import Names
+from push_ros.process import Spinner
+from push_scenario.scenario import scenario_from_mapping
+from push_study.graph_run import LockstepRun
+from push_study.team_run import run_team
+from push_study.uncertainty import uncertainty
+from push_view.report import write_report
+from push_view.report_panel import LivePanel
+
+NAME = f"{__name__}:METHOD"
+
+
+@settings
+class ShoveSettings:
+    """How hard the bulldozer shoves."""
+
+    speed: float = bounded(0.08, low=0.01, high=0.12, doc="Speed of a push (m/s).")
+    within: float = bounded(0.05, low=0.001, high=1.0, doc="Distance that counts as there (m).")
+
+
+class Bulldozer:
+    """One round robot that drives straight at an object which stands before it."""
+
+    def __init__(self, arena):
+        self._arena, self._settings = arena, arena.section("", ShoveSettings)
+        self._goal, self._code, self._reason = None, 0, "waiting for a goal"
+
+    @property
+    def status(self):
+        phase = JobPhase.PUSHING if self._goal is not None else JobPhase.IDLE
+        return Status(int(phase), phase.name, self._reason, self._code)
+
+    def assess(self, task, belief, seen):
+        if belief.object(self._arena.object).mass > 0.4:
+            return Refusal(JobError.TOO_HEAVY, "a bulldozer this small shoves no more than 0.4 kg")
+        return Certificate()
+
+    def begin(self, task, belief):
+        self._goal, self._code, self._reason = task.goal, 0, "shoving"
+
+    def step(self, seen, belief):
+        away, _ = self.errors(seen)
+        if away < self._settings.within:
+            self.end(JobError.NONE, "there")
+            return Told()
+        (name,) = seen.robots
+        ahead = seen.object[:2] - seen.robots[name][:2]
+        turn = math.remainder(math.atan2(ahead[1], ahead[0]) - seen.robots[name][2], 2.0 * math.pi)
+        return Told({name: (self._settings.speed, 2.0 * turn)})
+
+    def report(self, seen):
+        way = np.vstack([seen.object[:2], self._goal[:2]])
+        return Report("shove", (Figure("still to go", self.errors(seen)[0], "m"),),
+                      (polyline("beeline", way),))  # fmt: skip
+
+    def end(self, code, reason):
+        if self._goal is not None:
+            self._last, self._goal = self._goal, None
+            self._code, self._reason = int(code), reason
+
+    def revive(self):
+        pass
+
+    def release(self):
+        return frozenset(self._arena.robots) if self._goal is None else frozenset()
+
+    def errors(self, seen):
+        goal = self._goal if self._goal is not None else getattr(self, "_last", seen.object)
+        return float(np.hypot(*(seen.object - goal)[:2])), 0.0
+
+    def facts(self):
+        return {"make": "yellow"}
+
+
+def one_robot(robots, item):
+    if len(robots) != 1:
+        raise SettingsError(f"has {len(robots)} robots; a bulldozer works alone")
+
+
+METHOD = MethodSpec("bulldozer", Bulldozer, {"": ShoveSettings}, one_robot)
+
+
+def scenario(count=1, mass=0.3, **parameters):
+    values = {
+        "environment": {"size": [3.0, 2.0]},
+        "robots": {
+            f"e{k}": {"type": "epuck_ring", "start": [-0.8, 0.4 * k, 0.0]} for k in range(count)
+        },
+        "objects": {"object": {"type": "swarm_square", "start": [-0.5, 0.0, 0.0], "mass": mass}},
+        "parameters": {"bridge": {"world": "planar"}, **parameters},
+    }
+    return scenario_from_mapping(values, "added", "test")
+
+
+GOAL = np.array([0.0, 0.0, 0.0])
+
+
+def test_its_node_brings_the_object_there_and_page_and_bag_show_it(tmp_path):
+    believed = scenario(**{NAME: {"speed": 0.1}})
+    bag = tmp_path / "bag"
+    with LockstepRun(
+        believed, lambda: [RecorderNode(bag, believed, 1)], quiet=True, system=NAME
+    ) as run:
+        run.start()
+        page = LivePanel(run.observer, Names("/", "/"), ["e0"])
+        state = run.reach(GOAL, 60.0)
+        assert state is not None and state.error_code == 0 and state.refusals == 0
+        assert state.system == "bulldozer"
+        rows = dict(page.rows())
+        assert rows["phase"] == "shove" and rows["still to go"].endswith("mm")
+        assert {s["layer"] for s in page.shapes()} == {"beeline"}
+        speed = np.diff(np.array(run.observer.trace.robot)[50:150, 0]).max() * 100.0
+        assert speed == pytest.approx(0.1, rel=0.2), "its setting came through"
+    contents = load(bag)
+    (job,) = contents.jobs.values()
+    (series,) = job.reports.values()
+    assert series.method == "bulldozer" and len(series.figures["still to go"][2]) > 20
+    assert write_report(bag, tmp_path / "report", animate=False)["position_error_m"] < 0.06
+
+
+def test_a_study_runs_it_in_its_uncertainty():
+    outcome = run_team(NAME, scenario(), Task((GOAL,)), uncertainty("mild"), 1, 60.0)
+    assert outcome.success and 0.0 < outcome.error[0] < 0.06 and outcome.seconds > 3.0
+    assert outcome.trace.phases["shove"] == pytest.approx(outcome.seconds, abs=0.2)
+    assert len(outcome.trace.ways) == pytest.approx(outcome.seconds / 0.2, abs=2)
+
+
+def test_its_settings_and_its_team_are_checked_before_anything_starts(capsys):
+    nodes = nodes_of(NAME, scenario())
+    assert [n.kind for n in nodes] == ["bridge", NAME]
+    words = nodes[1].words("file")
+    assert f'method:="{NAME}"' in words and 'robots:=["e0"]' in words
+    with pytest.raises(SettingsError, match="works alone"):
+        prepare(scenario(2), system=NAME)
+    with pytest.raises(SettingsError, match="speed"):
+        prepare(scenario(**{NAME: {"speed": 9.0}}), system=NAME)
+    full = prepare(scenario(**{NAME: {"speed": 0.1}}), system=NAME).scenario
+    assert full.parameters[NAME]["within"] == 0.05, "defaults are written out"
+    assert main(["launch", "nowhere:METHOD"]) == 2
+    assert "nowhere" in capsys.readouterr().err
+
+
+def test_what_it_refuses_is_refused_at_the_door():
+    loaded = scenario(mass=0.6)
+    outcome = run_team(NAME, loaded, Task((GOAL,)), uncertainty("none"), 1, 60.0)
+    assert not outcome.success and outcome.code is JobError.TOO_HEAVY
+    assert "0.4 kg" in outcome.reason and outcome.seconds == 0.0
+
+
+def test_a_process_of_its_own_hosts_it_too(ros):
+    from push_ros.method_node import MethodNode
+
+    node = MethodNode(NAME, scenario())
+    spinner = Spinner([node])
+    try:
+        assert isinstance(node, Node) and node.spec.name == "bulldozer"
+        assert node.get_parameter("speed").value == 0.08
+    finally:
+        spinner.close()

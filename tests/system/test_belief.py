@@ -1,0 +1,128 @@
+"""``/belief``, published in mid-job, changes what every system does at its next step."""
+
+import numpy as np
+import pytest
+
+from push_model.belief import Interval
+from push_msgs.msg import Belief, JobState
+from push_ros.qos import BELIEF
+from push_ros.report_conversions import belief_to_ros
+from push_scenario.scenario import load_scenario, scenario_from_mapping
+from push_study.graph_run import LockstepRun
+
+
+def tell(run, values, source="person"):
+    """Publish a belief and let the nodes hear it."""
+    if not hasattr(run, "said"):
+        run.said = run.observer.create_publisher(Belief, "/belief", BELIEF)
+        run.spin_until(lambda: run.said.get_subscription_count() > 0, 5.0)
+    run.said.publish(belief_to_ros(source, {k: Interval(*v) for k, v in values.items()}))
+    begin = run.bridge.time
+    run.spin_until(lambda: run.bridge.time > begin + 0.05, 1.0)
+
+
+def pushing(run, goal, limit=120.0):
+    run.teams[""].send_goal(np.array(goal))
+    assert run.spin_until(lambda: run.observer.state.state == JobState.PUSHING, limit)
+    begin = run.bridge.time
+    run.spin_until(lambda: run.bridge.time > begin + 0.5, 2.0)
+
+
+@pytest.fixture(scope="module")
+def single():
+    scenario = load_scenario("short")
+    with LockstepRun(scenario, quiet=True) as run:
+        run.start()
+        yield run
+
+
+def test_planner_and_controller_take_up_a_friction(single):
+    """Half the friction: half the stable curvature, of the push under way and of the next plan."""
+    item = next(iter(single.scenario.objects))
+    friction = single.scenario.objects[item][0].contact_friction
+    pushing(single, single.scenario.goal)
+    before = single.controller.tracker.push.limits
+    planned = single.planner._planner("", item).scene.sides[0].nominal
+    half = friction / 2.0
+    tell(single, {(item, "contact_friction"): (half, 0.9 * half, 1.1 * half)})
+    after = single.controller.tracker.push.limits
+    assert after.maximum == pytest.approx(0.5 * before.maximum, rel=0.05)
+    again = single.planner._planner("", item).scene.sides[0].nominal
+    assert again.maximum == pytest.approx(0.5 * planned.maximum, rel=0.05)
+    tell(single, {("", "latency"): (0.02, 0.01, 0.03)}, source="clockmaker")
+    assert single.controller.tracker._reckoning.delay == 0.02
+    assert single.controller.tracker.push.limits == after, "what another source said stays"
+
+
+def test_what_cannot_be_believed_is_refused_and_changes_nothing(single):
+    item = next(iter(single.scenario.objects))
+    before = single.planner._beliefs.current
+    message = belief_to_ros("person", {(item, "contact_friction"): Interval.exact(0.3)})
+    for field, value in (
+        ("values", [float("nan")]),
+        ("lows", [0.9]),
+        ("highs", [9.0]),
+        ("quantities", ["charm"]),
+        ("bodies", ["nobody"]),
+        ("source", ""),
+    ):
+        broken = belief_to_ros("person", {(item, "contact_friction"): Interval.exact(0.3)})
+        setattr(broken, field, value)
+        single.said.publish(broken)
+    begin = single.bridge.time
+    single.spin_until(lambda: single.bridge.time > begin + 0.05, 1.0)
+    assert single.planner._beliefs.current == before
+    assert single.planner._diagnostics.refused["/belief"] == 6
+    assert message.source == "person"
+
+
+def test_a_group_pushes_on_with_the_friction_that_it_is_told():
+    values = {
+        "environment": "open",
+        "robots": {
+            f"e{i}": {"type": "epuck_ring", "start": [-0.9, y, 0.0]}
+            for i, y in enumerate((-0.4, 0.0, 0.4))
+        },
+        "objects": {"plate": {"type": "plate_ellipse", "start": [0.0, 0.0, 0.0]}},
+        "parameters": {"bridge": {"world": "planar"}},
+    }
+    scenario = scenario_from_mapping(values, "group", "test")
+    with LockstepRun(scenario, quiet=True, system="group") as run:
+        run.start()
+        pushing(run, (0.5, 0.3, 0.4))
+        job = run.supervisor.method.job
+        before = job.last.command
+        tell(run, {("plate", "contact_friction"): (0.05, 0.04, 0.06)})
+        controller = job._push.controller
+        assert controller.friction == 0.05 and run.planner._item.contact_friction == 0.05
+        after = job.last.command
+        inward = (after.forces * after.contacts.normals).sum(axis=1)
+        normals = after.contacts.normals
+        along = np.abs(normals[:, 0] * after.forces[:, 1] - normals[:, 1] * after.forces[:, 0])
+        assert (along <= 0.05 * inward + 1e-9).all(), "forces lie in the narrower cones"
+        assert before.lacking <= after.lacking + 1e-9
+        tell(run, {("plate", "floor_friction"): (1.2, 1.0, 1.4)})
+        heavy = job._push.controller.surface.max_force
+        spec = scenario.objects["plate"][0]
+        assert heavy == pytest.approx(1.2 / spec.floor_friction * spec.limit_surface().max_force)
+        assert controller.friction == 0.05, "what it said of contact is replaced"
+        assert job._push.controller.friction == spec.contact_friction
+
+
+def test_a_swarm_makes_its_law_anew_for_what_it_is_told():
+    scenario = load_scenario("swarm-square").settings("bridge", world="planar")
+    with LockstepRun(scenario, quiet=True, system="swarm") as run:
+        run.start()
+        pushing(run, (0.6, 0.2, 0.5))
+        job, name = run.supervisor.method.job, run.supervisor.object
+        tell(run, {(name, "contact_friction"): (0.6, 0.5, 0.7)})
+        assert job._law._item.contact_friction == 0.6
+        assert job.busy, "the job goes on"
+        outline = 1.1 * scenario.objects[name][0].outline
+        message = belief_to_ros("person", {}, {name: outline})
+        run.said.publish(message)
+        begin = run.bridge.time
+        run.spin_until(lambda: run.bridge.time > begin + 0.05, 1.0)
+        assert job._law._item.outline == pytest.approx(outline, abs=1e-9)
+        reach = float(np.hypot(*outline.T).max())
+        assert job._lever == pytest.approx(reach, rel=1e-6) and job.busy

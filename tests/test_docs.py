@@ -1,0 +1,148 @@
+"""The pages of docs against the code: error codes have their rows, and links lead somewhere."""
+
+import ast
+import importlib
+import re
+from enum import IntEnum
+from pathlib import Path
+
+import pytest
+
+from grasp_opt.group_control import GroupControlSettings
+from grasp_opt.group_job import GroupJobSettings
+from grasp_opt.group_push import GroupPushSettings
+from grasp_opt.step_planner import StepSettings
+from push_model.jobs import JobError
+from push_mpc.settings import ControllerSettings, MpcSettings, TrackerSettings
+from push_mpc.task import TrackError
+from push_mpc.torque_tracker import TorqueTrackerSettings
+from push_mpc.wheel_slip_nmpc import WheelSlipSettings
+from push_planner import PlanError, PlannerSettings
+from push_planner.robot_path import RobotPathError
+from push_supervisor import SupervisorSettings
+from swarm_push.agent import AgentSettings
+from swarm_push.laws import LawSettings
+from swarm_push.swarm_job import SwarmJobSettings
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+ENUMS = {JobError: "MoveObject", PlanError: "PlanPush", TrackError: "FollowTrajectory"} | {
+    RobotPathError: "PlanRobotPath"
+}
+
+
+def rows(section):
+    """Names and numbers of the codes in the section of docs/errors.md that names an interface."""
+    parts = (ROOT / "docs/errors.md").read_text().split("\n## ")[1:]
+    (text,) = [p for p in parts if f"`{section}`" in p.splitlines()[0]]
+    found = {}
+    for name, number, meaning, remedy in re.findall(
+        r"^\| `(\w+)` \| (\d+) \| (.+?) \| (.+?) \|$", text, re.M
+    ):
+        assert len(meaning) > 10 and len(remedy) > 5, name
+        found[name] = int(number)
+    return found
+
+
+def interfaces():
+    """Every action and service that has error codes, with them."""
+    for path in sorted((ROOT / "push_msgs").glob("*/*.*")):
+        if path.suffix in (".action", ".srv"):
+            result = path.read_text().split("---")[1]
+            codes = re.findall(r"^uint16 ([A-Z_]+)=(\d+)", result, re.M)
+            if codes:
+                yield path.stem, {name: int(number) for name, number in codes}
+
+
+@pytest.mark.parametrize(("name", "codes"), list(interfaces()))
+def test_every_code_of_an_interface_has_its_row(name, codes):
+    assert codes.items() <= rows(name).items()
+
+
+def test_every_error_enum_is_one_of_an_interface():
+    found = set()
+    for path in ROOT.glob("*/*.py"):
+        for name in re.findall(r"^class (\w+Error)\((?:IntEnum|Enum)\)", path.read_text(), re.M):
+            module = importlib.import_module(f"{path.parent.name}.{path.stem}")
+            found.add(getattr(module, name))
+    assert found == set(ENUMS)
+    for kind, interface in ENUMS.items():
+        assert issubclass(kind, IntEnum)
+        assert {code.name: int(code) for code in kind}.items() <= rows(interface).items()
+
+
+def anchor(heading):
+    """As GitHub makes it."""
+    return re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_links_and_pictures_lead_somewhere(page):
+    for target in re.findall(r"\]\((?!https?:)([^)\s]+)\)", page.read_text()):
+        name, _, place = target.partition("#")
+        other = (page.parent / name).resolve() if name else page
+        assert other.exists(), target
+        if place:
+            headings = re.findall(r"^#+ (.+)$", other.read_text(), re.M)
+            assert place in map(anchor, headings), target
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_files_that_a_page_names_exist(page):
+    """Paths in back quotes: ``folder/file.py`` from the root, or a bare ``file.py`` anywhere."""
+    known = {p.name for p in ROOT.glob("*/**/*.py")}
+    for name in re.findall(r"`((?:\w+/)*\w+\.(?:py|yaml|md))`", page.read_text()):
+        if "/" in name:
+            assert (ROOT / name).is_file(), name
+        else:
+            assert name in known or name.endswith((".yaml", ".md")), name
+
+
+SECTIONS = {
+    "planner": {"": PlannerSettings},
+    "controller": {"": ControllerSettings, "mpc": MpcSettings, "tracker": TrackerSettings},
+    "supervisor": {"": SupervisorSettings},
+    "torque_controller": {"nmpc": WheelSlipSettings, "tracker": TorqueTrackerSettings},
+    "group": {"": GroupJobSettings, "control": GroupControlSettings, "push": GroupPushSettings},
+    "optimizer": {"": StepSettings},
+    "swarm": {"": SwarmJobSettings, "law": LawSettings, "agents": AgentSettings},
+}
+SYSTEMS = [ROOT / "docs" / f"{name}.md" for name in ("single-robot", "group", "swarm", "torque")]
+
+
+@pytest.mark.parametrize("page", SYSTEMS, ids=lambda p: p.name)
+def test_defaults_that_a_page_tells_are_those_of_the_settings(page):
+    found = re.findall(r"^\| (\w+) \| `([\w.]+)` \| (.+?) \| .+ \|$", page.read_text(), re.M)
+    assert len(found) >= 5
+    for node, name, told in found:
+        section, _, field = name.rpartition(".")
+        value = getattr(SECTIONS[node][section](), field)
+        if isinstance(value, bool | str):
+            assert told.strip("`") == (value if isinstance(value, str) else str(value).lower()), (
+                name
+            )
+        else:
+            number, _, unit = told.partition(" ")
+            assert float(number) * (1e-3 if unit == "mm" else 1.0) == pytest.approx(value), name
+
+
+PLAIN = (
+    "push_planner/settings.py",
+    "push_mpc/settings.py",
+    "push_model/*.py",
+    "push_scenario/*.py",
+)
+
+
+@pytest.mark.parametrize(
+    "path", sorted(p for g in PLAIN for p in ROOT.glob(g)), ids=lambda p: p.stem
+)
+def test_the_text_of_a_parameter_stands_alone(path):
+    """As ``ros2 param describe`` shows it: a phrase of its own, that does not lean on another."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.keyword) and node.arg == "doc":
+            text = ast.literal_eval(node.value)
+            assert len(text.split()) >= 2 and not text[0].islower(), text
+            assert not re.search(r"likewise|meanwhile|^Of |^By |^At |^\(|that it |whoever", text), (
+                text
+            )
