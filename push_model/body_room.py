@@ -1,9 +1,11 @@
-"""The room that a body of any outline has at a pose and along a motion, never more than it is.
+"""Clearance of a body with any outline, at a pose and along a motion: a lower bound.
 
-Its outline counts, and whatever stands inside it: walls of the map as well as other obstacles. A
-motion has one twist, so that no point of the body moves faster than its corners do, and the room
-falls no faster either: where there is much of it, much of the motion can be left out (sphere
-tracing), and nothing of it is missed.
+The clearance is the distance of the body, as a filled shape, from the map's obstacles and from
+others. It is zero if an obstacle lies inside the outline without touching it.
+
+Along a motion with a constant twist, no point of the body is faster than its fastest corner. The
+clearance falls no faster than that. The next pose to check follows from the present clearance
+(sphere tracing), so that no part of the motion is missed.
 """
 
 import math
@@ -29,14 +31,14 @@ _OUTLINE = 0.02  # [m] between points of the outline; what lies between them cou
 _COVER = 3000  # points about, of a body's inside, that discs are chosen among
 _SURE = 0.05  # [m] of more room than is asked for, from which on it need not be known how much
 STEP = 1e-3
-"""[m] that the room on a motion may be less than at the poses that are looked at."""
+"""[m] by which the clearance between two poses that are checked may be less than at both."""
 _SOON = 0.04  # [m] of a motion on which a body leaves what it touches
 LEAST = 5e-3
 """[m] of room that a body keeps on a motion even where it starts with less than it should have."""
 
 
 class Surroundings(NamedTuple):
-    """What compiled functions need to know of map, body and obstacles; world frame, [m].
+    """Map, body and obstacles for compiled functions; world frame, [m].
 
     field, ox, oy, scale: as of ``DistanceField``. outline ``(n, 2)``, dense; corners ``(m, 2)``;
     cover ``(k, 3)`` x, y, radius of discs inside it, in which all of it lies that is ``depth`` from
@@ -60,9 +62,9 @@ class Surroundings(NamedTuple):
 
 @dataclass(frozen=True)
 class Body:
-    """A body's outline ``(n, 2)`` [m] about its origin, prepared for questions about its room.
+    """A body's outline ``(n, 2)`` [m] about its origin, and what follows from it.
 
-    dense: the same with points in between. cover, depth: see ``Surroundings``.
+    dense: the outline with more points. cover, depth: see ``Surroundings``.
     """
 
     outline: Array
@@ -85,12 +87,14 @@ class Body:
 
     @property
     def core(self) -> float:
-        """[m] by which the origin of a body with room is farther from everything than that room;
-        negative where obstacles may come nearer to it, as into a notch."""
+        """[m] which, added to the body's clearance, gives a lower bound of its origin's.
+
+        Negative if obstacles can come closer to the origin than to the body, as in a notch.
+        """
         return float((self.cover[:, 2] - np.hypot(*self.cover[:, :2].T)).max())
 
     def among(self, field: DistanceField, obstacles: Obstacles) -> Surroundings:
-        """What compiled functions need to know."""
+        """The arguments of the compiled functions for this body, a map and other obstacles."""
         return Surroundings(
             field.values,
             *field.args,
@@ -133,9 +137,9 @@ def _cover(outline: Array, pitch: float) -> Array:
 
 @numba.njit(cache=True)
 def room_at_pose(s: Any, x: float, y: float, theta: float, enough: float) -> float:
-    """[m] a lower bound of the body's room at a pose; 0 where it overlaps anything.
+    """Lower bound [m] of the body's clearance at a pose; 0 if it overlaps anything.
 
-    What is ``enough`` or more may be much less than there is.
+    The bound is tight only below ``enough``.
     """
     around = lookup(s.field, x, y, s.ox, s.oy, s.scale)
     room = around - s.reach
@@ -164,7 +168,7 @@ def room_at_pose(s: Any, x: float, y: float, theta: float, enough: float) -> flo
 
 @numba.njit(cache=True)
 def _among_capsules(s: Any, x: float, y: float, c: float, si: float, enough: float) -> float:
-    """[m] of room from obstacles that are not on the map, as far as it is less than enough."""
+    """Clearance [m] from obstacles that are not on the map, at most ``enough``."""
     least, n = enough, s.corners.shape[0]
     for k in range(s.capsules.shape[0]):
         if point_gap(s.capsules, k, x, y) - s.reach >= least:
@@ -200,7 +204,7 @@ def _among_capsules(s: Any, x: float, y: float, c: float, si: float, enough: flo
 
 @numba.njit(cache=True)
 def rooms_at_poses(s: Any, poses: Any) -> Any:
-    """``(n,)`` [m] at poses ``(n, 3)``, see ``room_at_pose``."""
+    """Clearances ``(n,)`` [m] at poses ``(n, 3)``, see ``room_at_pose``."""
     found = np.empty(poses.shape[0])
     for k in range(poses.shape[0]):
         found[k] = room_at_pose(s, poses[k, 0], poses[k, 1], poses[k, 2], math.inf)
@@ -222,14 +226,14 @@ def _room_after(s: Any, start: Any, motion: Any, part: float, enough: float) -> 
 
 @numba.njit(cache=True)
 def motion_keeps(s: Any, start: Any, motion: Any, need: float, leaves: bool) -> Any:
-    """Whether a body keeps ``need`` [m] all along a motion ``(3,)`` from a pose ``(3,)``.
+    """Whether a body keeps a clearance ``need`` [m] along a motion ``(3,)`` from a pose ``(3,)``.
 
-    Where an end has less room, it only becomes more on the way from it, but for a millimetre.
-    leaves: whether the body may touch something at the start, which it leaves soon.
+    If an end has less clearance, the clearance must not fall on the way from this end, except by 1
+    mm. leaves: the body may touch something at the start, if it has left it after 4 cm.
 
     Returns
     -------
-    That, and at how many poses its room was looked at.
+    Whether it does, and the number of poses that were checked.
     """
     speed, n = 0.0, s.corners.shape[0]
     for k in range(n):

@@ -1,10 +1,8 @@
-"""The way of a round robot from place to place: the one search that all systems use.
+"""The path of a round robot from point to point: the search that all systems use.
 
-A*, on a coarse lattice first and on all of it where that is too coarse, then straight lines where
-there is room for them. Units and arguments as in ``room.py``.
+A* on a coarse lattice, or on the full one if the coarse one has no path; then corners are left out
+where the straight line is free. Units and arguments as in ``room.py``.
 """
-
-import math
 
 import numpy as np
 
@@ -23,11 +21,11 @@ def relief(
     need: float,
     least: float,
 ) -> tuple[float, float]:
-    """Radius about an end that has too little ``room``, and how much less than ``need`` is asked
-    for within it.
+    """Radius about an end with too little ``room``, and how much less than ``need`` is required
+    within this radius.
 
-    The robot may stand closer to something than it would like, and comes no closer on the way out.
-    ``least`` is the least room that it may have at any time.
+    A robot that stands too close to an obstacle must be able to leave it; it may not come closer on
+    its way out. ``least`` is the least room that it may have at any time.
     """
     if room >= need:
         return 0.0, 0.0
@@ -64,9 +62,9 @@ def disc_way(
     ends: Array,
     need: float,
 ) -> Array:
-    """Corners ``(n, 2)`` of a short way between points, both included; ``n`` is 0 if there is none.
+    """Corners ``(n, 2)`` of a short path, start and goal included; ``n`` is 0 if there is none.
 
-    It keeps ``need`` everywhere, between its corners too, but for the slack about its ends.
+    The path keeps ``need`` everywhere, also between its corners, except near its ends.
     """
     way = shortest_way(field, capsules, body, start, goal, ends, need)
     if not len(way):
@@ -78,16 +76,14 @@ def disc_way(
 def straight_keeps(
     field: Array, capsules: Array, start: Array, goal: Array, need: float, spare: float
 ) -> bool:
-    """Whether a straight line keeps ``need`` from everything, or what it has at the end that has
-    less, but for ``spare``."""
+    """Whether a straight line keeps ``need`` from everything.
+
+    If an end is closer to an obstacle than that, the distance at this end is required instead.
+    ``spare`` is subtracted from what is required.
+    """
     rooms = [room_at(field, capsules, 0.0, p[0], p[1]) for p in (start, goal)]
     least = min(need, *rooms) - spare
     nothing = np.zeros((0, 4))
     return least > 0.0 and bool(
         segment_keeps(field, capsules, 0.0, nothing, least, start[0], start[1], goal[0], goal[1])
     )
-
-
-def length(points: Array) -> float:
-    """Of a way ``(n, 2)``."""
-    return math.fsum(np.hypot(*np.diff(points, axis=0).T))

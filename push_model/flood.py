@@ -1,6 +1,7 @@
-"""Ways of a disc from one place to everywhere: Dijkstra over a lattice, in steps of a budget.
+"""Shortest paths of a disc from one point to all others: Dijkstra on a lattice.
 
-Lengths and points are in lattice spacings of the ``DistanceField``, see ``room.py``.
+The work can be split: ``step`` settles a given number of places. Lengths and points are in lattice
+spacings of the ``DistanceField``, see ``room.py``.
 """
 
 import math
@@ -20,15 +21,15 @@ _NO_ENDS = np.zeros((0, 4))
 
 
 def lattice_loss(need: float, stride: int) -> float:
-    """How much more room than ``need`` both ends of a diagonal must have for it to keep that."""
+    """Room beyond ``need`` at both ends of a diagonal that ensures ``need`` all along it."""
     return math.sqrt(need**2 + 0.5 * stride**2) - need
 
 
 class Flood:
-    """Every ``stride``-th point of a field's lattice, as far as it has been reached.
+    """Paths to every ``stride``-th point of a field's lattice, as far as they are known.
 
-    state, cost: ``(rows, columns)`` how a place was reached, see ``grid_search.py``, and what its
-    way costs, ``STRAIGHT`` a stride.
+    state ``(rows, columns)``: how each place was reached, see ``grid_search.py``. cost ``(rows,
+    columns)``: of the path to it; a step to a side costs ``STRAIGHT``.
     """
 
     def __init__(
@@ -49,8 +50,10 @@ class Flood:
     def of_disc(
         cls, field: Array, capsules: Array, start: Array, need: float, stride: int
     ) -> "Flood":
-        """From a point, for a disc that keeps ``need`` on all its ways; where it starts with less
-        room, it only has to come away."""
+        """A flood from a point, for a disc whose centre keeps ``need`` on all its paths.
+
+        If it starts closer to an obstacle than that, it may not come closer on its way out.
+        """
         room = room_at(field, capsules, 0.0, start[0], start[1])
         ends = np.array([[*start, *relief(field, capsules, 0.0, start, room, need, 0.0)]])
         loss = lattice_loss(need, stride)
@@ -60,7 +63,7 @@ class Flood:
         return flood
 
     def begin(self, places: Array) -> None:
-        """Start from places ``(n, 3)``: row, column and cost so far."""
+        """Start at places ``(n, 3)``: row, column, and the cost of reaching them."""
         most = int(places[:, 2].max(initial=0))
         self._heads = np.zeros(most + 64, dtype=np.int32)
         for i, j, cost in places.tolist():
@@ -71,16 +74,16 @@ class Flood:
 
     @property
     def done(self) -> bool:
-        """Whether everything that can be reached is."""
+        """Whether all places that can be reached have been reached."""
         return bool(self._front[1] == 0)
 
     @property
     def frontier(self) -> int:
-        """Cost that no place has less of which is not reached yet."""
+        """Cost of the last place reached; every place not yet reached costs at least as much."""
         return int(self._front[2])
 
     def step(self, budget: int) -> bool:
-        """Reach so many more places; whether that is all."""
+        """Reach up to ``budget`` more places; returns ``done``."""
         self._pool, _ = expand(
             self._field,
             self._ends,
@@ -107,19 +110,18 @@ class Flood:
 
     @property
     def lengths(self) -> Array:
-        """``(rows, columns)`` of the ways to places; inf where none is known."""
+        """Path lengths ``(rows, columns)``; infinite where none is known yet."""
         found: Array = np.where(self.reached, self.cost * (self.stride / STRAIGHT), np.inf)
         return found
 
     def nearest(self, point: Array) -> tuple[int, int]:
-        """Row and column of the reached place that is nearest to a point; -1, -1: there is none."""
+        """Row and column of the reached place nearest to a point; -1, -1 if none is reached."""
         i, j = nearest_place(
             self.state, DONE, 2 * DONE - 1, 1, float(self.stride), point[0], point[1]
         )
         return int(i), int(j)
 
     def back(self, index: int) -> Array:
-        """Points ``(n, 2)`` where the way bends from a reached place, by its number, to where it
-        begins."""
+        """Corners ``(n, 2)`` of the path from a reached place, by its number, back to the start."""
         found: Array = back(self.state, index, self.stride)
         return found

@@ -1,6 +1,7 @@
-"""Free space on a map, for round robots among obstacles, and their ways through it.
+"""Free space on a map for round robots, and their paths through it.
 
-In metres and world coordinates; what is below is compiled (``room.py``, ``grid_search.py``).
+This is the interface in metres and world coordinates. The compiled functions that it calls work in
+lattice spacings of the distance field (``room.py``, ``grid_search.py``, ``flood.py``).
 """
 
 import math
@@ -27,8 +28,8 @@ __all__ = ["FreeSpace", "Obstacles", "Reach"]
 
 _NO_ENDS, _NO_CAPSULES = np.zeros((0, 4)), np.zeros((0, 5))
 _SPARE = 0.05
-"""Lattice spacings that a line may come closer to something than its end with too little room: the
-field's bound of a line is lower than that of its points by so much."""
+"""[lattice spacings] by which a line may come closer to an obstacle than its tighter end. The lower
+bound along a line is smaller than the bounds at its points by up to this much."""
 
 
 @numba.njit(cache=True)
@@ -56,10 +57,11 @@ def _rooms(
 
 @numba.njit(cache=True)
 def sees(field: Any, u0: float, v0: float, u1: float, v1: float, need: float, least: float) -> bool:
-    """Whether a disc goes straight from point to point, among the map's walls alone.
+    """Whether a disc can move straight from one point to another; only the map is considered.
 
-    It keeps ``need`` everywhere, or what it has at the end that has less, but never less than
-    ``least``. All in lattice spacings.
+    The centre must keep the distance ``need``. If an end is closer to an obstacle than that, the
+    distance at this end is required instead, but never less than ``least``. Lengths are in lattice
+    spacings.
     """
     for u, v in ((u0, v0), (u1, v1)):
         need = min(need, math.sqrt(max(0.0, square_at(field, u, v))) - _SPARE)
@@ -80,8 +82,11 @@ def _all_see(field: Any, here: Any, there: Any, need: float, least: float) -> An
 class FreeSpace:
     """Distances on a map, and a lattice of places on it.
 
-    field: the map's distance field. stride: lattice spacings of the field between places; shape:
-    rows and columns of places.
+    Attributes
+    ----------
+    field: the map's distance field.
+    stride: distance between neighbouring places, in lattice spacings of the field.
+    shape: rows and columns of places.
     """
 
     def __init__(self, grid: Any, spacing: float = 0.03) -> None:
@@ -108,14 +113,19 @@ class FreeSpace:
         return scaled_capsules(among.capsules, self.field.args[:2], self.field.args[2])
 
     def clearance(self, points: Array) -> Array:
-        """``(n,)`` [m] from points ``(n, 2)`` to the map's obstacles and edges; 0 in them. Never
-        more than it is."""
+        """Distance ``(n,)`` [m] of points ``(n, 2)`` from the map's obstacles and edges.
+
+        A lower bound; 0 inside obstacles and outside the map.
+        """
         points = np.ascontiguousarray(points, dtype=np.float64)
         found: Array = lookups(self.field.values, points, *self.field.args)
         return found
 
     def room(self, points: Array, among: Obstacles) -> Array:
-        """``(n,)`` [m] from points to anything; 0 in it."""
+        """Distance ``(n,)`` [m] of points ``(n, 2)`` from the map's obstacles and from others.
+
+        A lower bound; 0 inside any of them.
+        """
         points = np.ascontiguousarray(points, dtype=np.float64)
         found: Array = _rooms(
             self.field.values, among.capsules, among.corners, among.last, points, *self.field.args
@@ -123,9 +133,12 @@ class FreeSpace:
         return found
 
     def sees(self, here: Array, there: Array, radius: float, least: float) -> Mask:
-        """``(n,)`` whether discs can go straight from points to others, both ``(n, 2)`` [m], among
-        the map's walls alone: they keep a radius [m] everywhere, or what they have at the end that
-        has less, but never less than ``least`` [m]."""
+        """Which discs ``(n,)`` can move straight between points ``here`` and ``there (n, 2)`` [m].
+
+        Only the map is considered. The lines may have any length. The centre must keep ``radius``
+        [m]. If an end is closer to an obstacle than that, the distance at this end is required
+        instead, but never less than ``least`` [m].
+        """
         field = self.field
         found: Mask = _all_see(
             field.values,
@@ -137,13 +150,19 @@ class FreeSpace:
         return found
 
     def from_here(self, start: Array, radius: float, among: Obstacles = NOTHING) -> "Reach":
-        """Everywhere that the centre of a disc can go from a place ``(2,)``, ``radius`` [m] away
-        from everything; where it starts with less room it only has to come away."""
+        """Where a disc can go from a point ``(2,)`` [m].
+
+        Its centre keeps ``radius`` [m] from everything. If it starts closer to an obstacle than
+        that, it may not come closer on its way out.
+        """
         return Reach(self, np.asarray(start, dtype=np.float64), radius, among)
 
     def line_keeps(self, a: Array, b: Array, radius: float, among: Obstacles = NOTHING) -> bool:
-        """Whether a disc keeps so far [m] from everything on a straight line of any length, or as
-        far as at the end that has less room."""
+        """Whether a disc's centre keeps ``radius`` [m] on a straight line from a to b ``(2,)``.
+
+        The line may have any length. If an end is closer to an obstacle than ``radius``, the
+        distance at this end is required instead.
+        """
         field = self.field
         return straight_keeps(
             field.values,
@@ -156,7 +175,7 @@ class FreeSpace:
 
 
 class Reach:
-    """Where a disc can go from one place, and how."""
+    """Where a disc can go from one point, and along which paths."""
 
     def __init__(self, space: FreeSpace, start: Array, radius: float, among: Obstacles) -> None:
         """radius: [m] that it keeps from everything."""
@@ -173,11 +192,11 @@ class Reach:
 
     @cached_property
     def lengths(self) -> Array:
-        """``(k,)`` [m] of the ways to the places of the lattice; inf where there is none."""
+        """Path lengths ``(k,)`` [m] to the places of the lattice; infinite where there is none."""
         return self._flood.lengths.ravel() * self._space.field.spacing
 
     def way_to(self, goal: Array) -> Array | None:
-        """Corners ``(n, 2)`` [m] of a short way to a place; None where there is none."""
+        """Corners ``(n, 2)`` [m] of a short path to a point ``(2,)``; None if there is none."""
         goal = np.asarray(goal, dtype=np.float64)
         tip, spacing = self._space.field.lattice(goal), self._space.field.spacing
         ends = reliefs(self._field, self._capsules, 0.0, self._need, 0.0, (self._tip, tip))
@@ -191,7 +210,7 @@ class Reach:
         return np.vstack([self._start, self._space.metres(way[1:-1]), goal])
 
     def way_to_place(self, place: int) -> Array:
-        """The same to a place of the lattice, by its number, whose length is known."""
+        """The same to a place of the lattice, by its number; its length must be finite."""
         way = np.vstack([self._flood.back(place), self._tip])[::-1]
         ends = reliefs(self._field, self._capsules, 0.0, self._need, 0.0, (self._tip, way[-1]))
         kept = straightened(

@@ -1,9 +1,9 @@
-"""Ways of a body over a lattice of poses: A* that can be interrupted.
+"""A* over a lattice of a body's poses, which can be interrupted and continued.
 
-Poses are known by number: ``(heading, row, column)``, in this order. A step leads to one of eight
-neighbours with the same heading, or turns to the next heading on the spot. A step is taken when the
-body keeps its room all along it (``body_room.py``), not only at its ends. Costs are whole numbers,
-``STRAIGHT`` a step to a side. Rooms are found when they are asked for, and kept.
+Poses are numbered by heading, row and column, in this order. A step leads to one of the eight
+neighbours with the same heading, or turns on the spot to the next heading. A step is allowed if the
+body keeps its clearance all along it, not only at its ends (``body_room.py``). Costs are integers:
+a step to a side costs ``STRAIGHT``. Clearances are computed when they are needed, and stored.
 """
 
 import math
@@ -37,9 +37,9 @@ def pose_of(number: int, rows: int, columns: int, headings: int, pitch: float, s
 def room_of(
     number: int, rooms: Any, rows: int, columns: int, headings: int, pitch: float, s: Any, sure: Any
 ) -> float:
-    """[m] at a pose by its number, of which ``rooms (n,)`` knows those that are not negative.
+    """Clearance [m] at a pose by its number; stored in ``rooms (n,)``, negative where unknown.
 
-    Where there is ``sure`` [m] or more, it may be much less than there is.
+    A lower bound, which is tight only below ``sure`` [m].
     """
     x, y, theta = pose_of(number, rows, columns, headings, pitch, s)
     if s.capsules.shape[0] == 0:
@@ -63,8 +63,7 @@ def _step_keeps(
     s: Any,
     need: float,
 ) -> Any:
-    """Whether a step between neighbours that have room keeps it, and how many poses were looked
-    at."""
+    """Whether a body keeps its clearance on a step, and the number of poses that were checked."""
     x, y, theta = pose_of(a, rows, columns, headings, pitch, s)
     u, v, phi = pose_of(b, rows, columns, headings, pitch, s)
     turn = (phi - theta + math.pi) % (2.0 * math.pi) - math.pi
@@ -107,7 +106,7 @@ def expand_poses(
     lengths: Any,
     budget: int,
 ) -> Any:
-    """Settle poses until the goal is, or until so many poses have been settled or looked at.
+    """Continue until the goal is reached, or ``budget`` poses have been settled or checked.
 
     shape ``(3,)``: headings, rows, columns. turn: cost of a turn to the next heading. guess
     ``(rows, columns)`` and turned ``(headings,)``: lower bounds of what is left to the goal; their
@@ -116,7 +115,7 @@ def expand_poses(
 
     Returns
     -------
-    The pool of the queue; the pose before the goal, -1 until it is settled; what was spent.
+    The pool of the queue; the last pose before the goal, -1 until it is found; the budget spent.
     """
     headings, rows, columns = shape[0], shape[1], shape[2]
     layer = rows * columns
@@ -187,7 +186,7 @@ def expand_poses(
 
 @numba.njit(cache=True)
 def chain(state: Any, number: int, shape: Any) -> Any:
-    """Numbers of poses on the way to a settled one, the first one first."""
+    """Numbers of the poses on the way to a settled one, from the first to the last."""
     headings, rows, columns = shape[0], shape[1], shape[2]
     layer = rows * columns
     numbers = [number]

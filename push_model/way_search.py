@@ -1,9 +1,9 @@
-"""A search for an object's way that goes on in slices, so that whoever looks can do other things.
+"""A search for an object's way that can be interrupted, so that a node can do other work.
 
-First the straight piece to the goal. Else a lattice of poses (``pose_lattice.py``): A*, guided by
-the ways of a disc inside the object, to a way that is at most a tenth longer than the best; then,
-from each of its poses, as far along as one piece leads. What a slice does depends on nothing but
-the search: equal searches find equal ways, however they are sliced.
+The straight piece to the goal is tried first. If it is blocked, A* searches a lattice of poses
+(``pose_lattice.py``). Its heuristic is the path length of a disc inside the object, times 1.1: the
+way found costs at most a tenth more than the best one on the lattice. Then the way is divided into
+few pieces, each as long as possible. The result does not depend on how the search is sliced.
 """
 
 import math
@@ -28,10 +28,10 @@ _PITCH = 0.06  # [m] between places of the lattice
 _TURN = 0.25  # [m] of way that a radian costs
 _JOIN = 0.6  # [m] from start and goal, turns counted as ways, within which they join the lattice
 _TO_LATTICE = 40  # poses of the lattice that start and goal try to join
-_GREED = 1.1  # weight of the heuristic: far less is searched for hardly more way
-_CALL = 15  # poses that take as long as a call of compiled code
-_SLICE = 256  # poses that are looked at before a search can be interrupted, about
-_PER_PLACE = 10  # places of the flood that take as long as one pose that is looked at
+_GREED = 1.1  # weight of the heuristic
+_CALL = 15  # poses whose check takes as long as a call of compiled code
+_SLICE = 256  # poses that are checked, about, before a search can be interrupted
+_PER_PLACE = 10  # places of the flood that take as long as checking one pose
 
 
 Counts = NDArray[np.int64]
@@ -39,7 +39,7 @@ _Numbers = tuple[Counts, Counts, Counts]
 
 
 class NoObjectWay(Exception):
-    """Raised when there is no way with room for robots."""
+    """Raised if there is no way with room for robots."""
 
 
 @dataclass(frozen=True)
@@ -51,10 +51,11 @@ class ObjectWay:
 
 
 class PoseLattice:
-    """Poses of an object on a map, and what is known of the room at them on the bare map.
+    """A lattice of an object's poses on a map, and the clearances known so far.
 
-    shape: headings, rows, columns. pitch: [m] between places; stride: the same in spacings of the
-    field's lattice. rooms: [m] by number, negative where it is not known.
+    shape: headings, rows, columns. pitch: [m] between places. stride: the same in spacings of the
+    field's lattice. rooms: clearance [m] by number of pose, negative where it is unknown; only from
+    the map, without other obstacles.
     """
 
     def __init__(self, field: DistanceField) -> None:
@@ -68,17 +69,21 @@ class PoseLattice:
         self.rooms = self.unknown()
 
     def unknown(self) -> NDArray[np.float32]:
-        """As ``rooms``, with nothing known."""
+        """``rooms`` with all clearances unknown."""
         return np.full(int(np.prod(self.shape)), -1.0, dtype=np.float32)
 
     def pose(self, number: int, around: Surroundings) -> Array:
-        """``(3,)`` by its number."""
+        """A pose ``(3,)`` by its number."""
         h, rows, columns = self.shape.tolist()
         return np.array(pose_of(number, rows, columns, h, self.pitch, around))
 
     def near(self, end: Array) -> tuple[Counts, Array, Array]:
-        """Numbers of the poses about another one ``(3,)``, how far [m] their places are from it,
-        and how far they are with their turns; the nearest first."""
+        """The lattice's poses near another one ``(3,)``, the nearest first.
+
+        Returns
+        -------
+        Their numbers, their distances [m], and their distances [m] with turns counted as way.
+        """
         h, rows, columns = self.shape.tolist()
         x, y = (end[:2] - self.field.args[:2]) / self.pitch
         reach = math.ceil(_JOIN / self.pitch)
@@ -96,7 +101,7 @@ class PoseLattice:
 
 
 class WaySearch:
-    """A search for one way. Call ``step`` until it is done, then ask for ``way``."""
+    """A search for one way. Call ``step`` until it returns true, then read ``way``."""
 
     def __init__(
         self,
@@ -107,8 +112,8 @@ class WaySearch:
         start: Array,
         goal: Array,
     ) -> None:
-        """room: [m] that the body keeps. start, goal ``(3,)``; where the goal's heading is nan,
-        with any heading."""
+        """room: [m] clearance of the way. start, goal: poses ``(3,)``; a goal whose heading is nan
+        may be reached with any heading."""
         self._lattice, self._body, self._around, self._room = lattice, body, around, room
         self._start, self._goal = np.array(start, dtype=float), np.array(goal, dtype=float)
         bare = not len(around.capsules)
@@ -119,12 +124,14 @@ class WaySearch:
 
     @property
     def done(self) -> bool:
-        """Whether it is known if there is a way."""
+        """Whether the search has ended, with a way or without."""
         return self._found is not None
 
     def step(self, budget: int) -> bool:
-        """Go on until about so many poses have been looked at, some microseconds each; whether the
-        search is done."""
+        """Go on until about ``budget`` poses have been checked (1 to 3 microseconds each).
+
+        Returns ``done``. A step takes at most some hundred poses more than its budget.
+        """
         while self._found is None and budget > 0:
             try:
                 budget -= next(self._work)
@@ -136,7 +143,7 @@ class WaySearch:
 
     @property
     def way(self) -> ObjectWay:
-        """What was found, of a search that is done.
+        """The way that was found; only after the search is done.
 
         Raises
         ------
@@ -148,7 +155,7 @@ class WaySearch:
         return self._found
 
     def _slices(self) -> Generator[int, None, ObjectWay]:
-        """Yields what each slice has cost; returns the way."""
+        """Yields the number of poses that each slice has checked; returns the way."""
         start, goal = self._start, self._goal
         direct = screw_between(start, _headed(goal, start))
         keeps, looked = motion_keeps(self._around, start, direct, self._room, True)
@@ -171,8 +178,12 @@ class WaySearch:
         return ObjectWay(start, motions)
 
     def _joined(self, end: Array, leaves: bool) -> Generator[int, None, _Numbers]:
-        """Poses of the lattice to which a piece leads from an end, and what they cost: their
-        numbers, ways to their places, and the same with turns."""
+        """Poses of the lattice to which a piece leads from an end.
+
+        Returns
+        -------
+        Their numbers, the costs of their distances, and the same with turns.
+        """
         lattice, asked = self._lattice, self._room + STEP
         h, rows, columns = lattice.shape.tolist()
         kept: list[tuple[int, int, int]] = []
@@ -201,8 +212,8 @@ class WaySearch:
         return found[:, 0].copy(), found[:, 1].copy(), found[:, 2].copy()
 
     def _guess(self, ends: _Numbers, begins: _Numbers) -> Generator[int, None, Counts]:
-        """``(rows, columns)`` costs of ways of a disc inside the body to the goal's place, weighed
-        by ``_GREED``."""
+        """Costs ``(rows, columns)`` of a disc's paths to the goal, times ``_GREED``; the disc lies
+        inside the body."""
         lattice = self._lattice
         _, rows, columns = lattice.shape.tolist()
         need = max(0.0, self._room + self._body.core) / lattice.field.spacing
@@ -227,7 +238,7 @@ class WaySearch:
     def _over_lattice(
         self, begins: _Numbers, ends: _Numbers, guess: Counts
     ) -> Generator[int, None, Counts]:
-        """Numbers of the poses of the cheapest way."""
+        """Numbers of the poses of the way found."""
         lattice, goal = self._lattice, self._goal
         h, rows, columns = lattice.shape.tolist()
         turn = round(_TURN * 2.0 * math.pi / h * self._unit)
@@ -277,7 +288,7 @@ class WaySearch:
                 raise NoObjectWay(self._no_way())
 
     def _few_pieces(self, poses: Array) -> Generator[int, None, Array]:
-        """From each pose as far along as one piece leads."""
+        """Motions ``(k, 3)`` in place of poses ``(n, 3)``, each as long as the clearance allows."""
         motions, k = [], 0
         while k < len(poses) - 1:
             ahead = len(poses) - 1
@@ -294,5 +305,5 @@ class WaySearch:
 
 
 def _headed(end: Array, pose: Array) -> Array:
-    """An end whose heading does not matter has that of a pose."""
+    """An end ``(3,)``; if its heading is nan, with that of a pose."""
     return np.array([*end[:2], pose[2]]) if math.isnan(end[2]) else end

@@ -1,7 +1,7 @@
-"""The way of an object round walls, and where on it the object is to head next.
+"""The path of an object round walls, and the pose on it that the object heads for.
 
-A way is looked for in slices, a budget a tick: robots go on meanwhile. The widest of three rooms
-about the object that there is a way for is taken.
+The path is searched in slices, one per control tick, so that no tick is long. Three clearances are
+tried, the widest first.
 """
 
 import math
@@ -80,9 +80,11 @@ class TrackSettings:
 
 
 class ObjectTrack:
-    """For one object and robots of one radius [m]. under_way: whether there is a way; searching:
-    whether one is looked for; holds: whether the object is to stay where it is until there is.
-    field: distances of the map."""
+    """The path of one object, with room for robots of one radius [m].
+
+    under_way: whether there is a way. searching: whether a search is going on. holds: whether the
+    object has to wait for its first way. field: distance field of the map.
+    """
 
     def __init__(
         self,
@@ -130,17 +132,22 @@ class ObjectTrack:
     def follow(
         self, now: float, pose: Array, target: Array, others: Array, walled: bool
     ) -> tuple[Array, bool]:
-        """Pose ``(3,)`` that an object at ``(3,)`` is to head for on its way to a target, and
-        whether the way is a new one. Looks for a way when there is none, when it has left that
-        which there is, or when there are more or fewer others ``(k, 3)`` x, y, radius [m], a slice
-        at every call; until there is one, it is to head for the target, but see ``holds``.
+        """The pose ``(3,)`` that the object heads for next, and whether its way has just changed.
 
-        Where no way leads round all others, one that leads through them will do; without walls
-        (``walled``) the straight one.
+        A way is searched if there is none, if the object is off its way, or if the number of other
+        bodies has changed. Each call does one slice of the search. Until the first way is known the
+        target is returned, and ``holds`` is true. If no way leads round all other bodies, they are
+        ignored; in a room without walls the straight way is taken.
+
+        Parameters
+        ----------
+        now: [s]. pose, target: ``(3,)`` of the object; the target's heading may be nan. others:
+            ``(k, 3)`` x, y, radius [m] of bodies that stand in the room. walled: whether there are
+            walls inside the room.
 
         Raises
         ------
-        NoObjectWay: walls part it from the target.
+        NoObjectWay: walls separate the object from its target.
         """
         fresh = False
         if self._search is None:
@@ -161,7 +168,7 @@ class ObjectTrack:
         return (self.aim(pose)[0] if self._pieces else np.array(target)), fresh
 
     def _make_do(self, pose: Array, target: Array, walled: bool) -> bool:
-        """Without a way round all others; whether there is one now."""
+        """Called if no way leads round all other bodies; returns whether there is a way now."""
         if not walled:  # straight on, and against whoever stands there
             self.go_straight(pose, target)
             return True
@@ -177,9 +184,11 @@ class ObjectTrack:
         return bool(room.max() > 0.0)
 
     def begin(self, pose: Array, target: Array, others: Array) -> None:
-        """Look for a way from one pose ``(3,)`` to another, whose heading may be nan, round others
-        ``(k, 3)`` x, y, radius [m]: ``search`` goes on with it. The way that there is stays until
-        then."""
+        """Begin to search a way from one pose ``(3,)`` to another, whose heading may be nan.
+
+        It leads round bodies ``(k, 3)`` x, y, radius [m]. Call ``search`` to go on. The present way
+        stays until the search succeeds.
+        """
         s, among = self.settings, Obstacles(discs=np.array(others))
         start, self._wanted = np.array(pose), np.array(target)
         rooms = [self._diameter + spare for spare in (s.wide, s.room, s.least_room)]
@@ -189,11 +198,11 @@ class ObjectTrack:
         self._search = next(self._searches)
 
     def search(self, budget: int | None = None) -> bool:
-        """Go on for a tick, or until so many poses have been looked at; whether the search is over.
+        """Check ``budget`` poses, by default those of one tick; whether the search has succeeded.
 
         Raises
         ------
-        NoObjectWay: it is over, and there is none. The way that there was stays.
+        NoObjectWay: there is none. The present way stays.
         """
         assert self._search is not None
         if not self._search.step(budget or self.settings.budget):

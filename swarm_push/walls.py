@@ -1,4 +1,4 @@
-"""The walls of a map as robots of a swarm meet them: room, lines of sight, ways round corners."""
+"""Walls of a map, for the robots of a swarm: distances, lines of sight, and paths round corners."""
 
 from typing import Any
 
@@ -17,11 +17,11 @@ from swarm_push.region import is_open
 _LATTICE = 0.03  # [m] between places of robots' ways
 _SPARE = 0.01  # [m] that ways keep from walls beside the robot's radius
 _LEAST = 0.5  # part of its radius that the centre of a robot always keeps from walls
-_AHEAD = 20  # places of its way, at most, that a robot looks ahead for the farthest that it sees
+_AHEAD = 20  # places of its path among which a robot heads for the farthest one that it sees
 _NEAR = 8  # places in each direction among which a robot looks for one that it sees
-_MOVED = 0.03  # [m] that the object moves until ways to it are looked for again
+_MOVED = 0.03  # [m] of motion of the object after which the paths to it are computed again
 _STEP = 0.01  # [m] of the differences that give the direction of the nearest wall
-_BUDGET = 6_000  # places that are reached in a tick, 1 ms about
+_BUDGET = 6_000  # places that a tick adds to the paths, which takes about 1 ms
 
 
 class Walls:
@@ -57,7 +57,7 @@ class Walls:
         return clear
 
     def into_room(self, points: Array) -> Array:
-        """``(n, 2)`` [m] the points, those in walls moved to the nearest place with room."""
+        """Points ``(n, 2)`` [m]; those too close to walls are moved to the nearest free place."""
         found, stride = points.copy(), self.space.stride
         for k in np.flatnonzero(~self.free(points)):
             u, v = self._field.lattice(points[k])
@@ -69,8 +69,11 @@ class Walls:
         return found
 
     def bounds(self, points: Array, rate: float, gap: float) -> Array:
-        """``(n, 3)`` a unit vector towards the nearest wall of each robot at ``(n, 2)`` [m], and
-        how fast [m/s] it may go along it: so much [1/s] of what is left beyond a gap [m]."""
+        """Speed limits towards walls of robots at ``(n, 2)`` [m].
+
+        Returns ``(n, 3)``: the unit vector towards the nearest wall, and the greatest speed [m/s]
+        along it, which is ``rate`` [1/s] times the distance left beyond ``gap`` [m].
+        """
         here = self.space.clearance(points)
         most = rate * (here - self._radius - gap)
         unit = self.towards(points)
@@ -78,8 +81,10 @@ class Walls:
         return np.column_stack([unit, most])
 
     def towards(self, points: Array) -> Array:
-        """``(n, 2)`` unit vectors towards the nearest wall of points ``(n, 2)`` [m]; zero where
-        there is none nearer than others."""
+        """Unit vectors ``(n, 2)`` from points ``(n, 2)`` [m] towards the nearest wall.
+
+        Zero where two walls are equally near.
+        """
         around = points + _STEP * np.array([[[1.0, 0.0]], [[-1, 0]], [[0, 1]], [[0, -1]]])
         east, west, north, south = self.space.clearance(around.reshape(-1, 2)).reshape(4, -1)
         away = np.column_stack([west - east, south - north])
@@ -91,12 +96,16 @@ class Walls:
     def round_corners(
         self, robots: Array, aims: Array, length: Array, item: Array
     ) -> tuple[Array, Array]:
-        """Where robots ``(n, 2)`` [m] head for that want to go to aims ``(n, 2)`` about an object
-        at ``item (2,)``, and how far ``(n,)`` [m] they have to go: to the aims where they see them,
-        along walls towards the object elsewhere.
+        """Next points for robots ``(n, 2)`` [m] on their way to aims ``(n, 2)`` round an object.
 
-        Ways are looked for in slices. A robot that none is known for yet stands; one that has none
-        goes where walls let it.
+        A robot that sees its aim heads for it. Any other one follows the shortest path along the
+        walls to the object at ``item (2,)``. The paths are computed in slices, one a call. Until a
+        robot's path is known, the robot stops. A robot that has none keeps its aim.
+
+        Returns
+        -------
+        Points ``(n, 2)`` [m] to head for, and lengths ``(n,)`` [m] of the ways that are left; those
+        of robots that see their aims are ``length``.
         """
         hidden = np.flatnonzero(~self.sees(robots, aims))
         if not len(hidden):
@@ -122,7 +131,7 @@ class Walls:
         return aims, length
 
     def sees(self, here: Array, there: Array) -> Mask:
-        """Whether robots can go straight to places, all ``(n, 2)`` [m], however far they are."""
+        """Which robots can move straight from ``here`` to ``there (n, 2)`` [m], at any distance."""
         return self.space.sees(here, there, self._radius, _LEAST * self._radius)
 
     def _flood_from(self, tip: Array) -> Flood:
@@ -131,8 +140,10 @@ class Walls:
         return Flood.of_disc(self._field.values, nothing, tip, self._need, stride)
 
     def _ways_to(self, item: Array, here: Array) -> Flood:
-        """Ways to the object from robots ``(n, 2)``, in lattice spacings, if they are known by now;
-        until they are, ways to where it was."""
+        """Paths to the object, for robots at ``(n, 2)`` [lattice spacings].
+
+        While paths to its present position are computed, those to its former position are used.
+        """
         if self._newer is None and np.hypot(*(item - self._towards)) > _MOVED:
             self._newer = self._flood_from(self._field.lattice(item))
             self._towards = np.array(item)
@@ -147,7 +158,7 @@ class Walls:
 
 @numba.njit(cache=True)
 def _are_reached(state: Any, stride: int, here: Any) -> bool:
-    """Whether ways lead to places about all points."""
+    """Whether paths are known to a place beside each of the points."""
     rows, columns = state.shape
     for k in range(here.shape[0]):
         some = False
@@ -165,8 +176,8 @@ def _are_reached(state: Any, stride: int, here: Any) -> bool:
 def _along(
     field: Any, state: Any, cost: Any, stride: int, here: Any, radius: float, least: float
 ) -> Any:
-    """Where on their ways points are to head for, the farthest that they see, and how long the
-    ways are; inf where none is known. All in lattice spacings."""
+    """The farthest point on its path that each robot sees, and the length of the path; infinite
+    where none is known. In lattice spacings."""
     rows, columns = state.shape
     found, lengths = here.copy(), np.full(here.shape[0], np.inf)
     for k in range(here.shape[0]):
