@@ -16,6 +16,7 @@ from push_model.jobs import GoalRefused, JobError
 from push_model.occupancy import OccupancyGrid as Grid
 from push_model.settings import SettingsError
 from push_msgs.action import MoveObject
+from push_ros.belief_feed import BeliefFeed
 from push_ros.diagnostics import Diagnostics
 from push_ros.job_intake import JobIntake
 from push_ros.map_feed import MapFeed
@@ -84,14 +85,23 @@ class SupervisorNode(Node):
         self._intake = JobIntake(
             self, self.names, self._diagnostics, self, "single", [self.robot], self.object
         )
-        self._connect()
+        self._connect(scenario)
         self._publish_state()
 
-    def _connect(self) -> None:
+    def _connect(self, scenario: Scenario) -> None:
         names = self.names
         heartbeat = names.robot(self.robot, "heartbeat")
         self._heartbeat_publisher = self.create_publisher(Header, heartbeat, STREAM)
         MapFeed(self, names, self._diagnostics, self._take_map)
+        BeliefFeed(
+            self,
+            names,
+            scenario,
+            self._diagnostics,
+            lambda belief: self.surroundings.believe(
+                belief.robot(self.robot), belief.object(self.object)
+            ),
+        )
         self.create_subscription(String, names.world("scenario"), self._on_scenario, LATCHED)
         self._watchdog = self.create_timer(
             0.1, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME)

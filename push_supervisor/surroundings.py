@@ -39,14 +39,18 @@ class Surroundings:
         others: Mapping[str, float],
         settings: SupervisorSettings,
     ) -> None:
-        self.robot, self.item, self.others = robot, item, dict(others)
-        self._too_heavy = too_heavy(robot, item)
+        self.others, self.settings = dict(others), settings
         self.grid: OccupancyGrid | None = None
         self.walls = _NONE
+        self.believe(robot, item)
+
+    def believe(self, robot: RobotSpec, item: ObjectSpec) -> None:
+        """Go on with what is believed of robot and object now."""
+        self.robot, self.item = robot, item
+        self._too_heavy = too_heavy(robot, item)
         self._outline, self._item_outline = robot.outline, item.outline
         self._hull = convex_hull(self._item_outline)
         self._item_radius = item.geometry.circumradius
-        self.settings = settings
 
     def change_settings(self, settings: SupervisorSettings) -> None:
         """The margin may be another one."""

@@ -153,3 +153,28 @@ def test_launch_says_what_to_do_next():
     assert _what_next(setup).endswith("planar-push goal X Y THETA --namespace lab --team south")
     torque = prepare("wheel-slip", system="torque")
     assert _what_next(torque) == "send trajectories to: /pioneer/follow_trajectory"
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("box.contact_friction=0.25:0.2:0.3", (("box", "contact_friction"), (0.25, 0.2, 0.3))),
+        ("latency=0.03", (("", "latency"), (0.03, 0.03, 0.03))),
+        ("a.b.mass=1", (("a.b", "mass"), (1.0, 1.0, 1.0))),
+        ("box.charm=1", None),
+        ("box.mass", None),
+        ("box.mass=heavy", None),
+        ("box.mass=1:2", None),
+        ("box.mass=1:2:3", None),
+        ("box.mass=nan", None),
+    ],
+)
+def test_a_belief_on_the_command_line(text, expected):
+    from planar_push.belief import parsed
+    from push_model.belief import BeliefError, Interval
+
+    if expected is None:
+        with pytest.raises(BeliefError):
+            parsed(text)
+    else:
+        assert parsed(text) == (expected[0], Interval(*expected[1]))
