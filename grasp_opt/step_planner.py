@@ -98,7 +98,8 @@ class StepPlanner:
         self._shape = item.geometry.outline
         self._radius = robot.footprint_radius
         room = 2.0 * self._radius + s.room
-        self._finders = [WayFinder(self._space, self._shape, part * room) for part in _ROOMS]
+        finder = WayFinder(self._space, self._shape, room)
+        self._finders = [finder.with_room(part * room) for part in _ROOMS]
         self._reach = float(np.hypot(*self._shape.T).max())
         self._known: dict[int, list[Array]] = {}  # by the number of robots
         self._fewest = 0  # of the plan under way

@@ -1,183 +1,219 @@
-"""Room for round robots on a map, and their ways through it.
+"""Free space on a map for round robots, and their paths through it.
 
-The library's shortest paths on a lattice (scipy.sparse.csgraph), then straight lines where there is
-room for them. Fine enough for robots that go one after the other round an object; for narrow
-passages there is the planner of one robot (push_planner).
+This is the interface in metres and world coordinates. The compiled functions that it calls work in
+lattice spacings of the distance field (``room.py``, ``grid_search.py``, ``flood.py``).
 """
 
 import math
-from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
 
+import numba
 import numpy as np
-from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt, map_coordinates
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import dijkstra
 
 from push_model.arrays import Array, Mask
-from push_model.occupancy import OccupancyGrid
-from push_model.outlines import distance, inside
+from push_model.disc_way import disc_way, reliefs, straight_keeps
+from push_model.distance_field import DistanceField, lookup, lookups, square_at
+from push_model.flood import Flood
+from push_model.obstacles import (
+    NOTHING,
+    Obstacles,
+    inside_outlines,
+    point_gap,
+    scaled_capsules,
+)
+from push_model.room import segment_keeps, straightened
 
-_NEAR = 0.12  # [m] from an end of a way within which it joins the lattice
-_INEXACT = math.sqrt(0.5) + 0.125  # [cells]
-_SAMPLE = 0.01  # [m] between points of a line that are looked at
+__all__ = ["FreeSpace", "Obstacles", "Reach"]
+
+_NO_ENDS, _NO_CAPSULES = np.zeros((0, 4)), np.zeros((0, 5))
+_SPARE = 0.05
+"""[lattice spacings] by which a line may come closer to an obstacle than its tighter end. The lower
+bound along a line is smaller than the bounds at its points by up to this much."""
 
 
-@dataclass(frozen=True)
-class Obstacles:
-    """What stands on a map beside its walls.
+@numba.njit(cache=True)
+def _rooms(
+    field: Any,
+    capsules: Any,
+    corners: Any,
+    last: Any,
+    points: Any,
+    ox: float,
+    oy: float,
+    scale: float,
+) -> Any:
+    found = np.empty(points.shape[0])
+    for k in range(points.shape[0]):
+        x, y = points[k, 0], points[k, 1]
+        room = lookup(field, x, y, ox, oy, scale)
+        for m in range(capsules.shape[0]):
+            room = min(room, point_gap(capsules, m, x, y))
+        if room > 0.0 and inside_outlines(corners, last, x, y):
+            room = 0.0
+        found[k] = max(0.0, room)
+    return found
 
-    outlines: ``(m, 2)`` each, world frame. discs ``(k, 3)`` x, y, radius [m].
+
+@numba.njit(cache=True)
+def sees(field: Any, u0: float, v0: float, u1: float, v1: float, need: float, least: float) -> bool:
+    """Whether a disc can move straight from one point to another; only the map is considered.
+
+    The centre must keep the distance ``need``. If an end is closer to an obstacle than that, the
+    distance at this end is required instead, but never less than ``least``. Lengths are in lattice
+    spacings.
     """
+    for u, v in ((u0, v0), (u1, v1)):
+        need = min(need, math.sqrt(max(0.0, square_at(field, u, v))) - _SPARE)
+    return bool(
+        need >= least - 1e-9
+        and segment_keeps(field, _NO_CAPSULES, 0.0, _NO_ENDS, need, u0, v0, u1, v1)
+    )
 
-    outlines: tuple[Array, ...] = ()
-    discs: Array = field(default_factory=lambda: np.zeros((0, 3)))
+
+@numba.njit(cache=True)
+def _all_see(field: Any, here: Any, there: Any, need: float, least: float) -> Any:
+    found = np.empty(here.shape[0], dtype=np.bool_)
+    for k in range(here.shape[0]):
+        found[k] = sees(field, here[k, 0], here[k, 1], there[k, 0], there[k, 1], need, least)
+    return found
 
 
 class FreeSpace:
-    """Distances on a map, and a lattice of places on it."""
+    """Distances on a map, and a lattice of places on it.
 
-    def __init__(self, grid: OccupancyGrid, spacing: float = 0.03) -> None:
-        """spacing: [m] of the lattice."""
-        padded = np.pad(grid.occupied, 1, constant_values=True)
-        self._field = distance_transform_edt(~padded) * grid.resolution
-        self._origin, self._cell = grid.origin - 0.5 * grid.resolution, grid.resolution
-        x0, x1, y0, y1 = grid.extent
-        xs, ys = (np.arange(a + 0.5 * spacing, b, spacing) for a, b in ((x0, x1), (y0, y1)))
-        gx, gy = np.meshgrid(xs, ys)
-        self.places = np.column_stack([gx.ravel(), gy.ravel()])
-        """``(k, 2)`` [m] of the lattice."""
-        self.shape = gx.shape
-        self._room = self.clearance(self.places)
-        number = np.arange(len(self.places)).reshape(self.shape)
-        pairs = [
-            (number[:, :-1], number[:, 1:]),
-            (number[:-1], number[1:]),
-            (number[:-1, :-1], number[1:, 1:]),
-            (number[1:, :-1], number[:-1, 1:]),
-        ]
-        self._first = np.concatenate([a.ravel() for a, _ in pairs])
-        self._second = np.concatenate([b.ravel() for _, b in pairs])
-        self._length = np.hypot(*(self.places[self._first] - self.places[self._second]).T)
+    Attributes
+    ----------
+    field: the map's distance field.
+    stride: distance between neighbouring places, in lattice spacings of the field.
+    shape: rows and columns of places.
+    """
+
+    def __init__(self, grid: Any, spacing: float = 0.03) -> None:
+        """grid: an ``OccupancyGrid``, or its ``DistanceField``. spacing: [m] about, of places."""
+        self.field = grid if isinstance(grid, DistanceField) else DistanceField(grid)
+        self.stride = max(1, round(spacing / self.field.spacing))
+        rows, columns = self.field.values.shape
+        self.shape = (rows - 1) // self.stride + 1, (columns - 1) // self.stride + 1
+
+    @cached_property
+    def places(self) -> Array:
+        """``(k, 2)`` [m] of the lattice, row by row."""
+        rows, columns = self.shape
+        i, j = np.divmod(np.arange(rows * columns), columns)
+        return self.metres(np.column_stack([j, i]) * self.stride)
+
+    def metres(self, points: Array) -> Array:
+        """Points ``(n, 2)`` of the field's lattice in [m]."""
+        found: Array = points * self.field.spacing + np.array(self.field.args[:2])
+        return found
+
+    def capsules(self, among: Obstacles) -> Array:
+        """``(n, 5)`` of obstacles, in units of the field's lattice."""
+        return scaled_capsules(among.capsules, self.field.args[:2], self.field.args[2])
 
     def clearance(self, points: Array) -> Array:
-        """``(n,)`` [m] from points ``(n, 2)`` to the map's obstacles and edges; 0 in them.
+        """Distance ``(n,)`` [m] of points ``(n, 2)`` from the map's obstacles and edges.
 
-        Distances between the cells' centres are more than those to their squares by at most half a
-        diagonal, and between the centres they are interpolated: both are taken off.
+        A lower bound; 0 inside obstacles and outside the map.
         """
-        where = (np.asarray(points) - self._origin).T / self._cell
-        found = map_coordinates(self._field, where[::-1], order=1, mode="constant", cval=0.0)
-        room: Array = np.maximum(0.0, found - _INEXACT * self._cell)
-        return room
+        points = np.ascontiguousarray(points, dtype=np.float64)
+        found: Array = lookups(self.field.values, points, *self.field.args)
+        return found
 
     def room(self, points: Array, among: Obstacles) -> Array:
-        """``(n,)`` [m] from points to anything; 0 in it."""
-        points = np.asarray(points, dtype=np.float64)
-        return self._least(points, self.clearance(points), among)
+        """Distance ``(n,)`` [m] of points ``(n, 2)`` from the map's obstacles and from others.
 
-    @staticmethod
-    def _least(points: Array, room: Array, among: Obstacles) -> Array:
-        for outline in among.outlines:
-            away = np.where(inside(outline, points), 0.0, distance(outline, points))
-            room = np.minimum(room, away)
-        for x, y, radius in among.discs:
-            gap = np.hypot(points[:, 0] - x, points[:, 1] - y) - radius
-            room = np.minimum(room, np.maximum(0.0, gap))
-        return room
-
-    def from_here(self, start: Array, radius: float, among: Obstacles) -> "Reach":
-        """Everywhere that the centre of a disc can go from a place ``(2,)``, ``radius`` [m] away
-        from everything; where it starts with less room it only has to come away."""
-        room = self._least(self.places, self._room, among)
-        return Reach(self, np.asarray(start, dtype=np.float64), radius, among, room >= radius)
-
-    def edges(self, free: Mask) -> csr_matrix:
-        """Lengths [m] between neighbours of the lattice that are both free."""
-        keep = free[self._first] & free[self._second]
-        count = len(self.places)
-        return csr_matrix(
-            (self._length[keep], (self._first[keep], self._second[keep])), shape=(count, count)
+        A lower bound; 0 inside any of them.
+        """
+        points = np.ascontiguousarray(points, dtype=np.float64)
+        found: Array = _rooms(
+            self.field.values, among.capsules, among.corners, among.last, points, *self.field.args
         )
+        return found
 
-    def line_keeps(self, a: Array, b: Array, radius: float, among: Obstacles) -> bool:
-        """Whether a disc keeps so far [m] from everything on a straight line, or as far as at the
-        end that has less room."""
-        steps = max(2, math.ceil(float(np.hypot(*(b - a))) / _SAMPLE) + 1)
-        room = self.room(a + np.linspace(0.0, 1.0, steps)[:, None] * (b - a), among)
-        least = min(radius, float(room[0]), float(room[-1]))
-        return bool((room >= least - 1e-9).all())
+    def sees(self, here: Array, there: Array, radius: float, least: float) -> Mask:
+        """Which discs ``(n,)`` can move straight between points ``here`` and ``there (n, 2)`` [m].
+
+        Only the map is considered. The lines may have any length. The centre must keep ``radius``
+        [m]. If an end is closer to an obstacle than that, the distance at this end is required
+        instead, but never less than ``least`` [m].
+        """
+        field = self.field
+        found: Mask = _all_see(
+            field.values,
+            field.lattice(here),
+            field.lattice(there),
+            radius / field.spacing,
+            least / field.spacing,
+        )
+        return found
+
+    def from_here(self, start: Array, radius: float, among: Obstacles = NOTHING) -> "Reach":
+        """Where a disc can go from a point ``(2,)`` [m].
+
+        Its centre keeps ``radius`` [m] from everything. If it starts closer to an obstacle than
+        that, it may not come closer on its way out.
+        """
+        return Reach(self, np.asarray(start, dtype=np.float64), radius, among)
+
+    def line_keeps(self, a: Array, b: Array, radius: float, among: Obstacles = NOTHING) -> bool:
+        """Whether a disc's centre keeps ``radius`` [m] on a straight line from a to b ``(2,)``.
+
+        The line may have any length. If an end is closer to an obstacle than ``radius``, the
+        distance at this end is required instead.
+        """
+        field = self.field
+        return straight_keeps(
+            field.values,
+            self.capsules(among),
+            field.lattice(a),
+            field.lattice(b),
+            radius / field.spacing,
+            _SPARE,
+        )
 
 
 class Reach:
-    """Where a disc can go from one place, and how."""
+    """Where a disc can go from one point, and along which paths."""
 
-    def __init__(
-        self, space: FreeSpace, start: Array, radius: float, among: Obstacles, free: Mask
-    ) -> None:
-        """free: places of the lattice where it has room."""
-        self._space, self._start, self._radius, self._among = space, start, radius, among
-        self.free = free
-        count = len(space.places)
-        near = self._joined(start)
-        graph = space.edges(free)
-        away = np.hypot(*(space.places[near] - start).T)
-        # One more node, the start, with a way to each of its neighbours.
-        data = np.concatenate([graph.data, away])
-        lattice = graph.tocoo()
-        rows = np.concatenate([lattice.row, np.full(len(near), count)])
-        columns = np.concatenate([lattice.col, near])
-        whole = csr_matrix((data, (rows, columns)), shape=(count + 1, count + 1))
-        lengths, before = dijkstra(whole, directed=False, indices=count, return_predecessors=True)
-        self.lengths: Array = lengths[:-1]
-        """``(k,)`` [m] of the ways to the places of the lattice; inf where there is none."""
-        self.before: NDArray[np.int64] = before
-        """``(k + 1,)`` the place before each on its way; no place's number at the start."""
+    def __init__(self, space: FreeSpace, start: Array, radius: float, among: Obstacles) -> None:
+        """radius: [m] that it keeps from everything."""
+        self._space, self._field = space, space.field.values
+        self._start, self._need = start, radius / space.field.spacing
+        self._tip, self._capsules = space.field.lattice(start), space.capsules(among)
 
-    def _joined(self, point: Array) -> NDArray[np.int64]:
-        """Places of the lattice that a point has a straight line to."""
+    @cached_property
+    def _flood(self) -> Flood:
         space = self._space
-        away = np.hypot(*(space.places - point).T)
-        near = np.flatnonzero(self.free & (away < _NEAR))
-        near = near[np.argsort(away[near], kind="stable")][:12]
-        keeps = [space.line_keeps(point, space.places[k], self._radius, self._among) for k in near]
-        joined: NDArray[np.int64] = near[np.array(keeps, dtype=bool)]
-        return joined
+        flood = Flood.of_disc(self._field, self._capsules, self._tip, self._need, space.stride)
+        flood.step(flood.state.size)
+        return flood
+
+    @cached_property
+    def lengths(self) -> Array:
+        """Path lengths ``(k,)`` [m] to the places of the lattice; infinite where there is none."""
+        return self._flood.lengths.ravel() * self._space.field.spacing
 
     def way_to(self, goal: Array) -> Array | None:
-        """Corners ``(n, 2)`` [m] of a short way to a place; None where there is none."""
-        space, goal = self._space, np.asarray(goal, dtype=np.float64)
-        if space.line_keeps(self._start, goal, self._radius, self._among):
+        """Corners ``(n, 2)`` [m] of a short path to a point ``(2,)``; None if there is none."""
+        goal = np.asarray(goal, dtype=np.float64)
+        tip, spacing = self._space.field.lattice(goal), self._space.field.spacing
+        ends = reliefs(self._field, self._capsules, 0.0, self._need, 0.0, (self._tip, tip))
+        if segment_keeps(self._field, self._capsules, 0.0, ends, self._need, *self._tip, *tip):
             return np.vstack([self._start, goal])
-        ends = self._joined(goal)
-        if not len(ends):
+        if math.hypot(*(tip - self._tip)) * spacing < 1e-9:
             return None
-        total = self.lengths[ends] + np.hypot(*(space.places[ends] - goal).T)
-        best = int(np.argmin(total))
-        if not np.isfinite(total[best]):
+        way = disc_way(self._field, self._capsules, 0.0, self._tip, tip, ends, self._need)
+        if not len(way):
             return None
-        return self._straight(np.vstack([self._lattice_way(int(ends[best])), goal]))
+        return np.vstack([self._start, self._space.metres(way[1:-1]), goal])
 
     def way_to_place(self, place: int) -> Array:
-        """The same to a place of the lattice, by its number; it can be reached."""
-        return self._straight(self._lattice_way(place))
-
-    def _lattice_way(self, place: int) -> Array:
-        points = []
-        while 0 <= place < len(self._space.places):
-            points.append(self._space.places[place])
-            place = int(self.before[place])
-        return np.vstack([self._start, *points[::-1]])
-
-    def _straight(self, points: Array) -> Array:
-        """Fewer corners: from each as far as a straight line goes."""
-        kept, k = [points[0]], 0
-        while k < len(points) - 1:
-            ahead = len(points) - 1
-            while ahead > k + 1 and not self._space.line_keeps(
-                points[k], points[ahead], self._radius, self._among
-            ):
-                ahead = k + max(1, (ahead - k) // 2)
-            k = ahead
-            kept.append(points[k])
-        return np.array(kept)
+        """The same to a place of the lattice, by its number; its length must be finite."""
+        way = np.vstack([self._flood.back(place), self._tip])[::-1]
+        ends = reliefs(self._field, self._capsules, 0.0, self._need, 0.0, (self._tip, way[-1]))
+        kept = straightened(
+            self._field, self._capsules, 0.0, ends, self._need, np.ascontiguousarray(way)
+        )
+        return np.vstack([self._start, self._space.metres(kept[1:])])

@@ -1,7 +1,7 @@
 """Two-layer planning of pushes (sections 2.2.1-2.2.3), and of the robot's way between them."""
 
+from push_model.distance_field import DistanceField
 from push_planner.bodies import with_bodies
-from push_planner.distance_field import DistanceField
 from push_planner.planner import (
     PlanError,
     PlanningFailed,

@@ -19,14 +19,14 @@ import ompl.geometric as og
 import ompl.util as ou
 
 from push_model.arrays import Array
+from push_model.distance_field import DistanceField
+from push_model.grid_search import shortest_way
+from push_model.room import room_at, segment_keeps, slack_at, straightened
 from push_model.shapes import Shape
-from push_planner.distance_field import DistanceField
-from push_planner.grid_search import shortest_way
-from push_planner.room import room_at, segment_keeps, slack_at, straightened
+from push_model.widest_way import escape_radius, widest_clearance
 from push_planner.settings import PlannerSettings
-from push_planner.widest_way import escape_radius, widest_clearance
 
-_NO_CIRCLES: Array = np.zeros((0, 3))
+_NO_CIRCLES: Array = np.zeros((0, 5))
 _NO_ENDS: Array = np.zeros((0, 4))
 _LONGER = 1.05  # times the way on the lattice: a path of samples that long has missed that way
 _NARROWER = 0.98  # of the widest clearance, to leave samples some room

@@ -9,12 +9,12 @@ import numpy as np
 
 from push_model import se2
 from push_model.arrays import Array
+from push_model.distance_field import DistanceField
 from push_model.occupancy import OccupancyGrid
 from push_model.push_segment import PushSegment
 from push_model.specs import ObjectSpec, RobotSpec
 from push_model.trajectory import along_curve
 from push_planner.candidate_poses import along_guide, nearby, runs, scattered
-from push_planner.distance_field import DistanceField
 from push_planner.guide_path import GuidePath, NoGuidePath, guide_paths, origin_floor
 from push_planner.push_search import PushGraph, PushSearch, PushStep, SearchStatistics
 from push_planner.scene import PushScene

@@ -22,7 +22,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from push_planner.distance_field import between_samples, lookup, piece_square, points_clearance
+from push_model.distance_field import between_samples, lookup, piece_square, points_clearance
 
 SWEEP_LOSS = 0.0005
 """[m] by which the clearance of a push may be underestimated."""

@@ -7,13 +7,13 @@ import numpy as np
 
 from push_model import se2
 from push_model.arrays import Array
+from push_model.disc_way import disc_way, reliefs
+from push_model.distance_field import DistanceField
+from push_model.obstacles import disc_capsules, scaled_capsules
+from push_model.room import room_at
 from push_model.specs import RobotSpec
 from push_model.trajectory import Trajectory, concatenate, line, rotation
-from push_planner.distance_field import DistanceField
-from push_planner.grid_search import shortest_way
-from push_planner.room import room_at, straightened
 from push_planner.settings import PlannerSettings
-from push_planner.widest_way import escape_radius
 
 
 class RobotPathError(IntEnum):
@@ -55,64 +55,33 @@ def plan_robot_path(
     ------
     NoRobotPath
     """
-
     body = robot.footprint_radius * field.args[2]
     need = settings.safety_distance * field.args[2]
     # A bumper's corners reach farther than the body: with it in between, the robot can still leave.
     least = (robot.body_radius - robot.footprint_radius) * field.args[2]
-    disc = np.zeros((len(circles), 3))
-    if len(circles):
-        disc[:, :2] = field.lattice(circles[:, :2])
-        disc[:, 2] = circles[:, 2] * field.args[2]
-    tips = [field.lattice(np.asarray(pose[:2])) for pose in (start, goal)]
-    ends = np.zeros((2, 4))
-    for k, (tip, code, what) in enumerate(
-        (
-            (tips[0], RobotPathError.START_BLOCKED, "the robot stands"),
-            (tips[1], RobotPathError.GOAL_BLOCKED, "the robot's goal is"),
-        )
+    capsules = scaled_capsules(disc_capsules(circles), field.args[:2], field.args[2])
+    tips = field.lattice(start[:2]), field.lattice(goal[:2])
+    for tip, code, what in (
+        (tips[0], RobotPathError.START_BLOCKED, "the robot stands"),
+        (tips[1], RobotPathError.GOAL_BLOCKED, "the robot's goal is"),
     ):
-        room = room_at(field.values, disc, body, tip[0], tip[1])
+        room = room_at(field.values, capsules, body, tip[0], tip[1])
         if room < least:
             raise NoRobotPath(
                 code,
                 f"{what} too close to an obstacle: {(room + body) * field.spacing:.3f} m of "
                 f"{robot.body_radius:.3f} m",
             )
-        ends[k] = (*tip, *_relief(field, disc, body, tip, room, need, least))
-    way = shortest_way(field.values, disc, body, tips[0], tips[1], ends, need)
+    ends = reliefs(field.values, capsules, body, need, least, tips)
+    way = disc_way(field.values, capsules, body, *tips, ends, need)
     if not len(way):
         raise NoRobotPath(
             RobotPathError.NO_PATH,
             "no way for the robot between start and goal: it needs "
             f"{2.0 * (robot.footprint_radius + settings.safety_distance):.3f} m",
         )
-    way = straightened(field.values, disc, body, ends, need, way)
     points = np.vstack([start[:2], way[1:-1] * field.spacing + field.args[:2], goal[:2]])
     return _drive(points, start, goal, settings)
-
-
-def _relief(
-    field: DistanceField,
-    disc: Array,
-    body: float,
-    tip: Array,
-    room: float,
-    need: float,
-    least: float,
-) -> tuple[float, float]:
-    """Radius about an end, and how much less room there; all in lattice spacings.
-
-    The robot may stand closer to something than it would like, and comes no closer on the way out.
-    """
-    if room >= need:
-        return 0.0, 0.0
-    # A point that lies between those of the lattice may have more room than any of them.
-    for floor in (room - 1e-9, max(least, room - 0.75)):
-        radius = escape_radius(field.values, disc, body, tip, need, floor)
-        if np.isfinite(radius):
-            return radius, need - floor
-    return 0.0, 0.0
 
 
 def _drive(points: Array, start: Array, goal: Array, settings: PlannerSettings) -> Trajectory:

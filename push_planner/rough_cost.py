@@ -15,7 +15,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from push_planner.distance_field import lookup
+from push_model.distance_field import lookup
 
 _NEAREST = 0.03  # [m] of a push
 _WIDEST_COSINE = -0.4161468365471424  # of 2 rad: a push's end seen from its start, and vice versa

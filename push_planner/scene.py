@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from push_model import se2
 from push_model.arrays import Array
+from push_model.distance_field import DistanceField, holds_obstacle, points_clearance
 from push_model.pushable_sides import pushable_sides
 from push_model.shapes import densified
 from push_model.specs import ObjectSpec, RobotSpec
@@ -23,7 +24,6 @@ from push_model.stable_push import (
     contact_on_side,
     curvature_limits,
 )
-from push_planner.distance_field import DistanceField, holds_obstacle, points_clearance
 from push_planner.push_curve import PushCurve
 from push_planner.push_sweep import SWEEP_LOSS, push_clearance, rooms_behind
 from push_planner.settings import PlannerSettings

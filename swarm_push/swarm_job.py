@@ -5,7 +5,6 @@ Robots may come, leave and die meanwhile: whoever is seen and does as it is told
 
 import math
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from functools import partial
 
 import numpy as np
@@ -34,7 +33,6 @@ _STATES = {
     SwarmPhase.PUSH: (JobPhase.PUSHING, "robots push"),
 }
 _CLOSER = 5e-3  # [m] that counts as progress
-_PLAN_AGAIN = 2.0  # [s] at least between ways of the object
 _AT = 0.01  # [m] of a gap to a robot within which something may hold it up
 
 
@@ -82,12 +80,12 @@ class SwarmJob:
         self.holonomic = isinstance(robot.drive, HolonomicDrive)
         self._drive = None if self.holonomic else robot.differential
         self._speed, self._radius = robot.max_speed, robot.footprint_radius
-        walls, self._walls, self.track, self._grid = None, None, None, grid
+        walls, self._walls, self.track = None, None, None
         if grid is not None:
             walls = Walls(grid, self._radius)
             self._walls = None if walls.open else walls
             track = track or TrackSettings()
-            self.track = ObjectTrack(grid, item.geometry.outline, self._radius, track)
+            self.track = ObjectTrack(walls.space.field, item.geometry.outline, self._radius, track)
         self._make_law = partial(
             make_law,
             laws or LawSections(),
@@ -110,7 +108,6 @@ class SwarmJob:
         self._begun: float | None = None
         self._nearest = math.inf
         self._progress = self._seen = 0.0
-        self._planned, self._fixed = -math.inf, 0
 
     def warm_up(self) -> None:
         """Load what is compiled, so that the first command does not wait."""
@@ -158,7 +155,6 @@ class SwarmJob:
 
     def _new_way(self) -> None:
         self._law.reset()
-        self._planned, self._fixed = -math.inf, 0
         if self.track is not None:
             self.track.clear()
 
@@ -179,8 +175,9 @@ class SwarmJob:
         if not np.array_equal(outline, self._outline):
             self._outline = outline
             self._lever = float(np.hypot(*outline.T).max())
-            if self._grid is not None and self.track is not None:
-                self.track = ObjectTrack(self._grid, outline, self._radius, self.track.settings)
+            if self.track is not None:
+                track = self.track
+                self.track = ObjectTrack(track.field, outline, self._radius, track.settings)
         self._law = self._make_law(item)
 
     def errors(self, pose: Array) -> tuple[float, float]:
@@ -244,39 +241,22 @@ class SwarmJob:
                 track.clear()
                 self._nearest = math.inf
             return target
-        if not track.under_way or len(fixed) != self._fixed:
-            self._fixed, self._planned = len(fixed), now
-            try:
-                track.plan(pose, target, fixed)
-            except NoObjectWay as error:
-                if self._walls is None:  # then straight on, and against it
-                    track.go_straight(pose, target)
-                elif not len(fixed) or not self._round_walls(pose, target):
-                    self.end(JobError.PLANNING_FAILED, str(error))
-                    return None
+        try:
+            aim, fresh = track.follow(now, pose, target, fixed, self._walls is not None)
+        except NoObjectWay as error:
+            self.end(JobError.PLANNING_FAILED, str(error))
+            return None
+        if fresh:
             self._nearest = max(self._nearest, track.left(pose))
-        aim, off = track.aim(pose)
-        if off > track.settings.off and now - self._planned > _PLAN_AGAIN:
-            self._planned = now
-            with suppress(NoObjectWay):  # back to the way that there is
-                track.plan(pose, target, fixed)
-                aim, _ = track.aim(pose)
-                self._nearest = max(self._nearest, track.left(pose))
         return aim
-
-    def _round_walls(self, pose: Array, target: Array) -> bool:
-        """A way that leads through whoever stands about, where there is none round them."""
-        assert self.track is not None
-        with suppress(NoObjectWay):
-            self.track.plan(pose, target, np.zeros((0, 3)))
-            return True
-        return False
 
     def _spaced(self, step: SwarmStep, points: Array, fixed: Array) -> Array:
         s, speed = self.settings, self._speed
         bodies = np.vstack([points, fixed[:, :2]])
         radii = np.concatenate([np.full(len(points), self._radius), fixed[:, 2]])
         slowed = _limited(step.velocities, speed)
+        if self.track is not None and self.track.holds and step.phase is SwarmPhase.PUSH:
+            slowed[:] = 0.0
         bounds = np.column_stack([step.inward, step.most])[None]
         if self._walls is not None:
             walls = self._walls.bounds(points, s.closing, s.apart)

@@ -5,6 +5,7 @@ for there may be a thousand robots.
 """
 
 import math
+from functools import lru_cache
 from typing import Any
 
 import numba
@@ -14,8 +15,8 @@ from push_model.arrays import Array
 from push_model.outlines import convex_hull
 from swarm_push.rim import Rim
 
-_NEAR = 3.0  # robots' radii within which a robot at the object slides along it
-_SPARE = 0.02  # [m] of a way into a notch
+_NEAR = 3.0  # robot radii from its goal within which a robot goes there along the object
+_SPARE = 0.02  # [m] beyond its depth at which the straight way into a notch begins
 
 
 class WayRound:
@@ -29,15 +30,20 @@ class WayRound:
         slide: float,
         others: Array | None = None,
     ) -> None:
-        """outline: ``(k, 2)`` [m] about the centre of mass. clearance: [m] that robots keep from
-        the object as they go round it. slide: [m] into the object that one which slides
-        along it may head. others: ``(k, 3)`` x, y, radius [m] of what stands at the
-        object, in its frame; robots go round both together."""
+        """Prepare ways round one object, or round it and what stands beside it.
+
+        Parameters
+        ----------
+        outline: ``(k, 2)`` [m] about the centre of mass. radius: [m] of the robots. clearance: [m]
+            that robots keep from the object on their way round it. slide: [m] by which the aim of
+            a robot that slides along the object may lie inside it. others: ``(k, 3)`` x, y, radius
+            [m], in the object's frame, of bodies beside the object; robots go round all together.
+        """
         self._radius = radius
         whole = convex_hull(np.vstack([outline, *map(_disc, () if others is None else others)]))
         self._way = Rim(whole, radius + clearance, 0.05).points
         self._keep = Rim(whole, radius + 0.6 * clearance, 0.02).points
-        self._core = Rim(outline, radius - slide, 5e-3).points
+        self._core = _core(np.ascontiguousarray(outline).tobytes(), radius - slide)
 
     def aims(self, robots: Array, goals: Array) -> tuple[Array, Array]:
         """Where robots ``(n, 2)`` [m] head for on their ways to goals ``(n, 2)``, and how far
@@ -51,6 +57,12 @@ class WayRound:
             _NEAR * self._radius,
         )
         return aims, length
+
+
+@lru_cache(maxsize=64)
+def _core(outline: bytes, away: float) -> Array:
+    """``(k, 2)`` [m] the line so far from an outline, which is the same whatever stands about."""
+    return Rim(np.frombuffer(outline).reshape(-1, 2), away, 5e-3).points
 
 
 def _disc(other: Array) -> Array:

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from scipy.ndimage import label
 
+from push_model.distance_field import DistanceField
 from push_model.occupancy import OccupancyGrid, rasterise
 from push_model.shapes import polygon, rectangle
 from push_model.specs import BoxSpec, EnvironmentSpec
+from push_model.widest_way import widest_clearance
 from push_planner import PlanError, PlannerSettings, PlanningFailed, PushPlanner
-from push_planner.distance_field import DistanceField
 from push_planner.guide_path import (
     NoGuidePath,
     guide_paths,
@@ -20,7 +21,6 @@ from push_planner.guide_path import (
     path_cost,
     relieved_ends,
 )
-from push_planner.widest_way import widest_clearance
 from tests.push_planner.exact_geometry import points_distance, random_world
 
 QUICK = replace(PlannerSettings(), rrt_iterations=100, clearance_levels=2)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.ndimage import label
 
+from push_model.distance_field import DistanceField
 from push_model.occupancy import rasterise
 from push_model.specs import BoxSpec, EnvironmentSpec
 from push_planner import NoRobotPath, PlannerSettings, RobotPathError, plan_robot_path
-from push_planner.distance_field import DistanceField
 from tests.push_planner.exact_geometry import points_distance, random_world
 
 SETTINGS = PlannerSettings()

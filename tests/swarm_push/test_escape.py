@@ -76,7 +76,7 @@ def test_it_is_stuck_when_it_comes_no_further_and_nobody_comes_nearer():
     def leaves(speed=(0.0, 0.0), nearer=0.0, there=True, twist=wanted):
         """When [s] it is led off, moving and robots coming nearer at speeds [m/s]."""
         escape = Escape(Rim(item.geometry.outline, R, 1.5 * R), item, R, walls, 12.0, 0.02)
-        for now in np.arange(0.0, 40.0, 0.1):
+        for now in np.arange(0.0, 40.0, 0.02):
             pose = here + [speed[0] * now, speed[1] * now, 0.0]
             to_go = 20.0 - nearer * now if there else None
             if escape.motion(now, pose, twist, to_go) is not None:

@@ -10,8 +10,9 @@ from typing import Any
 import numba
 import numpy as np
 
-from push_planner.bucket_queue import new_pool, pop, push
-from push_planner.room import STEPS, corners, room_at, slack_at
+from push_model.bucket_queue import new_pool, pop, push
+from push_model.obstacles import point_gap
+from push_model.room import STEPS, corners, room_at, slack_at
 
 
 @numba.njit(cache=True)
@@ -77,13 +78,13 @@ def widest_clearance(
 
 @numba.njit(cache=True)
 def escape_radius(
-    field: Any, circles: Any, body: float, end: Any, need: float, floor: float
+    field: Any, capsules: Any, body: float, end: Any, need: float, floor: float
 ) -> float:
     """Radius about an end within which a way leads from it, with room ``floor``, to room ``need``.
 
     The least such radius, and an edge of the lattice more; infinite when there is no such way.
     """
-    if room_at(field, circles, body, end[0], end[1]) >= need:
+    if room_at(field, capsules, body, end[0], end[1]) >= need:
         return 0.0
     rows, columns = field.shape
     seen = np.zeros((rows, columns), dtype=np.uint8)
@@ -102,9 +103,8 @@ def escape_radius(
                 continue
             seen[i, j] = 1
             room = math.sqrt(field[i, j]) - body
-            for m in range(circles.shape[0]):
-                gap = math.hypot(j - circles[m, 0], i - circles[m, 1]) - circles[m, 2]
-                room = min(room, gap)
+            for m in range(capsules.shape[0]):
+                room = min(room, point_gap(capsules, m, 1.0 * j, 1.0 * i))
             # The end itself lies between points of the lattice that may have a little less.
             if room >= floor or (first and room >= floor - 0.75):
                 heapq.heappush(queue, (math.hypot(j - end[0], i - end[1]), i * columns + j))

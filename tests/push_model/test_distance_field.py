@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from push_model.distance_field import DistanceField, between_samples, piece_square
 from push_model.occupancy import OccupancyGrid, rasterise
 from push_model.shapes import densified, rectangle
-from push_planner.distance_field import DistanceField, between_samples, piece_square
 from tests.push_planner.exact_geometry import (
     body_distance,
     convex_distance,

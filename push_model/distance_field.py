@@ -136,6 +136,15 @@ def lookup(field: Any, x: float, y: float, ox: float, oy: float, scale: float) -
 
 
 @numba.njit(cache=True, fastmath=True)
+def lookups(field: Any, points: Any, ox: float, oy: float, scale: float) -> Any:
+    """``(n,)`` lower bounds of the distance [m] at points ``(n, 2)``; 0 outside the grid."""
+    found = np.empty(points.shape[0])
+    for k in range(points.shape[0]):
+        found[k] = lookup(field, points[k, 0], points[k, 1], ox, oy, scale)
+    return found
+
+
+@numba.njit(cache=True, fastmath=True)
 def between_samples(least: float, gap: float) -> float:
     """Lower bound of the distance [m] on a straight piece whose ends have at least ``least``."""
     return math.sqrt(max(0.0, least * least - 0.25 * gap * gap))

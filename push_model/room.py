@@ -1,12 +1,13 @@
-"""The room that a body which takes up a disc has at points and along segments.
+"""The room that a disc has at points and along segments: line of sight, and straight ways.
 
-Room is what is left of the distance to the map and to circles when the body stands there. A way
-needs so much of it everywhere but near its ends: within ``radius`` of an end it may have ``slack``
-less, since a body that stands beside a wall must be able to leave it.
+Room is the distance to the map and to other obstacles, less the radius of the disc. A way needs
+so much of it everywhere but near its ends: within ``radius`` of an end it may have ``slack`` less,
+since a robot that stands beside a wall must be able to leave it.
 
 Lengths are in lattice spacings of a ``DistanceField`` and points in spacings from the first point
-of its lattice. ``circles (n, 3)`` are x, y and the distance at which no room is left; ``ends (n,
-4)`` are x, y, radius, slack; ``field`` are the field's values.
+of its lattice. ``capsules (n, 5)`` are obstacles (``obstacles.py``) with radii at which no room is
+left; ``ends (n, 4)`` are x, y, radius, slack; ``field`` are the field's values. Segments are looked
+at by sphere tracing: no part of one is left out, however long it is.
 """
 
 import math
@@ -15,7 +16,8 @@ from typing import Any
 import numba
 import numpy as np
 
-from push_planner.distance_field import piece_square, square_at
+from push_model.distance_field import piece_square, square_at
+from push_model.obstacles import point_gap, segment_gap
 
 STEPS = np.array(
     [[0, 1], [1, 0], [0, -1], [-1, 0], [1, 1], [1, -1], [-1, 1], [-1, -1]]
@@ -45,18 +47,18 @@ def slack_at(ends: Any, u: float, v: float) -> float:
 
 
 @numba.njit(cache=True)
-def room_at(field: Any, circles: Any, body: float, u: float, v: float) -> float:
+def room_at(field: Any, capsules: Any, body: float, u: float, v: float) -> float:
     """Room at a point."""
     room = math.sqrt(max(0.0, square_at(field, u, v))) - body
-    for k in range(circles.shape[0]):
-        room = min(room, math.hypot(u - circles[k, 0], v - circles[k, 1]) - circles[k, 2])
+    for k in range(capsules.shape[0]):
+        room = min(room, point_gap(capsules, k, u, v))
     return room
 
 
 @numba.njit(cache=True)
 def segment_keeps(
     field: Any,
-    circles: Any,
+    capsules: Any,
     body: float,
     ends: Any,
     need: float,
@@ -68,14 +70,11 @@ def segment_keeps(
     """Whether a segment surely has the room it needs, everywhere along it."""
     length = math.hypot(u1 - u0, v1 - v0)
     if length == 0.0:
-        return bool(room_at(field, circles, body, u0, v0) >= need - slack_at(ends, u0, v0))
+        return bool(room_at(field, capsules, body, u0, v0) >= need - slack_at(ends, u0, v0))
     du, dv = (u1 - u0) / length, (v1 - v0) / length
-    near = False  # whether a circle leaves less than the full need somewhere
-    for k in range(circles.shape[0]):
-        t = (circles[k, 0] - u0) * du + (circles[k, 1] - v0) * dv
-        t = min(max(t, 0.0), length)
-        gap = math.hypot(u0 + du * t - circles[k, 0], v0 + dv * t - circles[k, 1])
-        near = near or gap - circles[k, 2] < need
+    near = False  # whether an obstacle leaves less than the full need somewhere
+    for k in range(capsules.shape[0]):
+        near = near or segment_gap(capsules, k, u0, v0, du, dv, 0.0, length) < need
     way = 0.0
     slack = slack_at(ends, u0, v0)
     square = square_at(field, u0, v0)
@@ -95,11 +94,9 @@ def segment_keeps(
             wanted = need - min(slack, beyond)
             low = math.sqrt(max(0.0, piece_square(square, following, step * step))) - body
             if near:
-                for k in range(circles.shape[0]):
-                    t = (circles[k, 0] - u0) * du + (circles[k, 1] - v0) * dv
-                    t = min(max(t, way), way + step)
-                    gap = math.hypot(u0 + du * t - circles[k, 0], v0 + dv * t - circles[k, 1])
-                    low = min(low, gap - circles[k, 2])
+                for k in range(capsules.shape[0]):
+                    gap = segment_gap(capsules, k, u0, v0, du, dv, way, way + step)
+                    low = min(low, gap)
             if low >= wanted - 1e-9:
                 break
             if step < _COARSEST:
@@ -110,7 +107,9 @@ def segment_keeps(
 
 
 @numba.njit(cache=True)
-def straightened(field: Any, circles: Any, body: float, ends: Any, need: float, points: Any) -> Any:
+def straightened(
+    field: Any, capsules: Any, body: float, ends: Any, need: float, points: Any
+) -> Any:
     """Points ``(m, 2)`` of a way ``(n, 2)``, left out as long as the straight way has room."""
     n = points.shape[0]
     kept = np.empty((n, 2))
@@ -121,7 +120,7 @@ def straightened(field: Any, circles: Any, body: float, ends: Any, need: float, 
         j = min(n - 1, i + _LOOKAHEAD)
         while j > i + 1 and not segment_keeps(
             field,
-            circles,
+            capsules,
             body,
             ends,
             need,
