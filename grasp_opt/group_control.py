@@ -59,6 +59,7 @@ class GroupControlSettings:
     apart: float = bounded(8e-3, low=0.0, high=1.0, doc="[m] between robots; nearer, they part")
     apart_gain: float = bounded(0.5, low=0.0, high=100.0, doc="[1/s] of what is lacking of it")
     lead: float = bounded(0.025, low=1e-3, high=1.0, doc="[m] of the controlled point ahead")
+    pose_delay: float = bounded(0.0, low=0.0, high=1.0, doc="[s] latency of the pose stream")
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,8 @@ class GroupCommand:
 
     wrench ``(3,)`` in the object's frame; forces ``(n, 2)`` [N] likewise; lacking: part of the
     wrench that they do not make; gaps ``(n,)`` [m] between robots and object; contacts: where the
-    robots are now; velocities ``(n, 2)`` [m/s] of robots in the world's frame.
+    robots are now; velocities ``(n, 2)`` [m/s] of robots in the world's frame; twist ``(3,)`` that
+    the forces give the object, in its frame.
     """
 
     wrench: Array
@@ -76,6 +78,7 @@ class GroupCommand:
     gaps: Array
     contacts: Contacts
     velocities: Array
+    twist: Array
 
 
 def distribute(wrench: Array, contacts: Contacts, friction: float, length: float) -> Array:
@@ -135,7 +138,13 @@ class GroupController:
         return unit
 
     def command(
-        self, pose: Array, twist: Array, wanted: Array, wanted_twist: Array, robots: Array
+        self,
+        pose: Array,
+        twist: Array,
+        wanted: Array,
+        wanted_twist: Array,
+        robots: Array,
+        headings: Array | None = None,
     ) -> GroupCommand:
         """One tick.
 
@@ -168,16 +177,26 @@ class GroupController:
         size = float(np.linalg.norm(wrench / scale))
         lacking = float(np.linalg.norm((wrench - made) / scale)) / size if size > 0.0 else 0.0
         off_place = s.place_gain * (self.places - local)
+        pushed = self._feasible(made, task)
         if s.law == "printed":
             moved = off_place + s.force_gain * forces
         else:
             normals = contacts.normals
-            moved = point_velocities(self._feasible(made, task), local)
+            moved = point_velocities(pushed, local + self._ahead_of(pose, headings))
             moved += off_place - (off_place * normals).sum(axis=1)[:, None] * normals
             moved += self._inward(gaps, forces, normals, touching)[:, None] * normals
         self._keep_apart(moved, local)
         world = se2.rotation_matrix(float(pose[2]))
-        return GroupCommand(wrench, forces, lacking, gaps, contacts, moved @ world.T)
+        velocities = moved @ world.T
+        return GroupCommand(wrench, forces, lacking, gaps, contacts, velocities, pushed)
+
+    def _ahead_of(self, pose: Array, headings: Array | None) -> Array:
+        """``(n, 2)`` [m] from the robots' centres to their controlled points, in the frame of an
+        object at a pose ``(3,)``; zero where no headings are given."""
+        if headings is None:
+            return np.zeros(2)
+        angles = headings - pose[2]
+        return self.settings.lead * np.column_stack([np.cos(angles), np.sin(angles)])
 
     def _keep_apart(self, moved: Array, local: Array) -> None:
         """Let robots at ``local (n, 2)`` that come too close to each other part again, by changing

@@ -18,6 +18,7 @@ from grasp_opt.group_control import (
     GroupControlSettings,
 )
 from grasp_opt.object_trajectory import ObjectTrajectory
+from grasp_opt.prediction import GroupPrediction
 from push_estimation.actuation_monitor import ActuationMonitor
 from push_estimation.velocity_filter import VelocityFilter
 from push_model import se2
@@ -101,12 +102,28 @@ class GroupPush:
         self._filter = VelocityFilter(
             s.position_noise, s.orientation_noise, s.acceleration, s.turning
         )
+        self._prediction = GroupPrediction(len(ways), self.controller.settings.pose_delay)
         self._obedience = ActuationMonitor(len(ways), s.dead, s.dead_way)
         self._begin: float | None = None
         self._last = 0.0
         self._contact_since: float | None = None
         self.time = 0.0  # [s] along the trajectory
         self._moved_on = 0.0  # [s] when it last did
+
+    @property
+    def pose_delay(self) -> float:
+        """[s] from the measurement of a frame to the command that answers it; may change at any
+        time."""
+        return self._prediction.delay
+
+    @pose_delay.setter
+    def pose_delay(self, seconds: float) -> None:
+        self._prediction.delay = seconds
+
+    def rest(self, now: float) -> None:
+        """A frame at a time [s] that is answered with zero commands."""
+        self._prediction.frame(now)
+        self._prediction.answer(np.zeros((len(self.ahead), 2)))
 
     def starts(self, pose: Array, off: float) -> Array:
         """``(n, 3)`` poses from which robots come to the object at a pose ``(3,)``, so far [m] from
@@ -116,7 +133,15 @@ class GroupPush:
         return np.column_stack([centres, headings])
 
     def step(self, now: float, pose: Array, robots: Array) -> GroupStep:
-        """One tick. pose ``(3,)`` of the object's centre of mass, robots ``(n, 3)``, at a time."""
+        """One tick. pose ``(3,)`` of the object's centre of mass, robots ``(n, 3)``, as they are in
+        the frame that is answered at a time now [s]."""
+        self._prediction.frame(now)
+        step = self._step(now, pose, robots)
+        pushed = None if step.command is None else step.command.twist
+        self._prediction.answer(step.twists, pushed)
+        return step
+
+    def _step(self, now: float, pose: Array, seen: Array) -> GroupStep:
         s = self.settings
         if self._begin is None:
             self._begin = self._last = self._moved_on = now
@@ -127,7 +152,7 @@ class GroupPush:
             self._moved_on += tick
             tick = 0.0
         self._filter.update(now, pose)
-        estimate = self._filter.pose
+        estimate, robots = self._prediction.item(self._filter.pose), self._prediction.robots(seen)
         searching = self._contact_since is None or now - self._contact_since < s.steady
         if not searching:
             self._go_on(now, tick, estimate)
@@ -147,7 +172,7 @@ class GroupPush:
             velocities = command.velocities
         lead = self.controller.settings.lead
         twists = self._drive.follow(velocities, robots[:, 2], lead)
-        failure, dead = self._failure(now, estimate, robots, twists, searching)
+        failure, dead = self._failure(now, estimate, seen, twists, searching)
         if failure:
             return GroupStep(Phase.FAILED, 0.0 * twists, command, self.time, failure, dead)
         if not searching and self.time >= self.trajectory.duration:
