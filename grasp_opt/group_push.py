@@ -168,6 +168,7 @@ class GroupPush:
                 self.trajectory.sample(ahead),
                 self.trajectory.twist_at(ahead),
                 robots[:, :2],
+                robots[:, 2],
             )
             velocities = command.velocities
         lead = self.controller.settings.lead
