@@ -36,30 +36,65 @@ class GroupControlSettings:
     """Gains of (3.20) and (3.25)."""
 
     law: Literal["twist", "printed"] = bounded(
-        "twist", doc="robots follow the object's feasible twist, or their forces as in (3.25)"
+        "twist", doc="control law: robots follow the object's feasible twist, or (3.25) as printed"
     )
-    position_gain: float = bounded(40.0, low=0.0, high=1e4, doc="[N/m] K_P of (3.20)")
-    orientation_gain: float = bounded(6.0, low=0.0, high=1e4, doc="[Nm/rad] K_P of (3.20)")
-    velocity_gain: float = bounded(2.0, low=0.0, high=1e4, doc="[Ns/m] K_D of (3.20)")
-    turning_gain: float = bounded(0.1, low=0.0, high=1e4, doc="[Nms/rad] K_D of (3.20)")
+    position_gain: float = bounded(
+        40.0, low=0.0, high=1e4, doc="gain K_P of (3.20) on position errors of the object (N/m)"
+    )
+    orientation_gain: float = bounded(
+        6.0,
+        low=0.0,
+        high=1e4,
+        doc="gain K_P of (3.20) on orientation errors of the object (Nm/rad)",
+    )
+    velocity_gain: float = bounded(
+        2.0, low=0.0, high=1e4, doc="gain K_D of (3.20) on velocity errors of the object (Ns/m)"
+    )
+    turning_gain: float = bounded(
+        0.1, low=0.0, high=1e4, doc="gain K_D of (3.20) on turn rate errors of the object (Nms/rad)"
+    )
     place_gain: float = bounded(
-        0.05, low=0.0, high=100.0, doc="[1/s] K_PR of (3.25), along the outline"
+        0.05,
+        low=0.0,
+        high=100.0,
+        doc="gain K_PR of (3.25) on a robot position along the outline (1/s)",
     )
-    gap_gain: float = bounded(2.0, low=0.0, high=100.0, doc="[1/s] K_PR towards the object")
+    gap_gain: float = bounded(
+        2.0, low=0.0, high=100.0, doc="gain on the gap between a robot and the object (1/s)"
+    )
     lost: float = bounded(
-        5e-3, low=1e-4, high=1.0, doc="[m] from the object at which a robot carries nothing"
+        5e-3, low=1e-4, high=1.0, doc="gap from which a robot counts as out of contact (m)"
     )
     approach: float = bounded(
-        0.02, low=0.0, high=1.0, doc="[m/s] at most towards the object, besides its own speed"
+        0.02,
+        low=0.0,
+        high=1.0,
+        doc="greatest speed of a robot relative to the object when it closes a gap (m/s)",
     )
-    force_gain: float = bounded(0.002, low=0.0, high=10.0, doc="[m/s/N] K_VR of (3.25)")
+    force_gain: float = bounded(
+        0.002,
+        low=0.0,
+        high=10.0,
+        doc="gain K_VR of (3.25) from contact force to robot speed (m/s/N)",
+    )
     correction: float = bounded(
-        2.0, low=1.0, high=10.0, doc="times the task's own speed that corrections may ask for"
+        2.0,
+        low=1.0,
+        high=10.0,
+        doc="greatest object speed under corrections, as a multiple of the trajectory speed",
     )
-    apart: float = bounded(8e-3, low=0.0, high=1.0, doc="[m] between robots; nearer, they part")
-    apart_gain: float = bounded(0.5, low=0.0, high=100.0, doc="[1/s] of what is lacking of it")
-    lead: float = bounded(0.025, low=1e-3, high=1.0, doc="[m] of the controlled point ahead")
-    pose_delay: float = bounded(0.0, low=0.0, high=1.0, doc="[s] latency of the pose stream")
+    apart: float = bounded(
+        8e-3, low=0.0, high=1.0, doc="gap between two robots below which they are driven apart (m)"
+    )
+    apart_gain: float = bounded(
+        0.5, low=0.0, high=100.0, doc="separation speed per missing gap between two robots (1/s)"
+    )
+    lead: float = bounded(
+        0.025, low=1e-3, high=1.0, doc="distance of the controlled point ahead of the axle (m)"
+    )
+    pose_delay: float = bounded(
+        0.0, low=0.0, high=1.0, doc="latency of the pose stream, from measurement to command (s)"
+    )
 
 
 @dataclass(frozen=True)

@@ -33,21 +33,72 @@ _GAP = 0.2  # [s] between ticks from which on they are no longer one after the o
 class GroupPushSettings:
     """What is taken for contact, for progress and for failure."""
 
-    contact: float = bounded(1e-3, low=1e-5, high=0.1, doc="[m] of a gap that counts as contact")
-    steady: float = bounded(0.1, low=0.0, high=10.0, doc="[s] that all must be in contact")
-    search: float = bounded(8.0, low=0.1, high=600.0, doc="[s] at most until all have contact")
-    behind: float = bounded(
-        0.01, low=1e-4, high=1.0, doc="[m] of error from which the trajectory waits, up to twice it"
+    contact: float = bounded(
+        1e-3,
+        low=1e-5,
+        high=0.1,
+        doc="gap between a robot and the object that counts as contact (m)",
     )
-    position_error: float = bounded(0.05, low=1e-3, high=10.0, doc="[m] at which the push fails")
-    orientation_error: float = bounded(0.3, low=0.01, high=7.0, doc="[rad] likewise")
-    stalled: float = bounded(4.0, low=0.1, high=600.0, doc="[s] without progress, likewise")
-    dead: float = bounded(1.0, low=0.1, high=60.0, doc="[s] that a robot may not do as told")
-    dead_way: float = bounded(0.01, low=1e-4, high=1.0, doc="[m] that it should have gone then")
-    position_noise: float = bounded(2e-4, low=1e-6, high=0.1, doc="[m] of poses, for the filter")
-    orientation_noise: float = bounded(1.7e-3, low=1e-6, high=0.5, doc="[rad] likewise")
-    acceleration: float = bounded(0.3, low=1e-3, high=100.0, doc="[m/s^2] of the object, likewise")
-    turning: float = bounded(1.5, low=1e-3, high=1000.0, doc="[rad/s^2] likewise")
+    steady: float = bounded(
+        0.1,
+        low=0.0,
+        high=10.0,
+        doc="time for which all robots must be in contact before a push begins (s)",
+    )
+    search: float = bounded(
+        8.0, low=0.1, high=600.0, doc="time limit for all robots to make contact (s)"
+    )
+    behind: float = bounded(
+        0.01,
+        low=1e-4,
+        high=1.0,
+        doc="object error from which the trajectory slows down; it stops at twice this (m)",
+    )
+    position_error: float = bounded(
+        0.05, low=1e-3, high=10.0, doc="position error of the object at which a push fails (m)"
+    )
+    orientation_error: float = bounded(
+        0.3, low=0.01, high=7.0, doc="orientation error of the object at which a push fails (rad)"
+    )
+    stalled: float = bounded(
+        4.0, low=0.1, high=600.0, doc="time without progress after which a push fails (s)"
+    )
+    dead: float = bounded(
+        1.0,
+        low=0.1,
+        high=60.0,
+        doc="time without commanded motion after which a robot is considered dead (s)",
+    )
+    dead_way: float = bounded(
+        0.01,
+        low=1e-4,
+        high=1.0,
+        doc="least commanded path in that time for a robot to be judged dead or alive (m)",
+    )
+    position_noise: float = bounded(
+        2e-4,
+        low=1e-6,
+        high=0.1,
+        doc="standard deviation of measured positions, for the velocity filter (m)",
+    )
+    orientation_noise: float = bounded(
+        1.7e-3,
+        low=1e-6,
+        high=0.5,
+        doc="standard deviation of measured headings, for the velocity filter (rad)",
+    )
+    acceleration: float = bounded(
+        0.3,
+        low=1e-3,
+        high=100.0,
+        doc="standard deviation of object acceleration, for the velocity filter (m/s^2)",
+    )
+    turning: float = bounded(
+        1.5,
+        low=1e-3,
+        high=1000.0,
+        doc="standard deviation of object angular acceleration, for the velocity filter (rad/s^2)",
+    )
 
 
 class Phase(Enum):

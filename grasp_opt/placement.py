@@ -1,27 +1,27 @@
 """Task-oriented placement of robots round an object (3.2.1): where, and with which forces.
 
-The thesis solves (3.16)-(3.19) by a local method. Here the places are searched for globally: with
-them given, the forces are a convex problem that is solved in a fraction of a millisecond
-(tracking_cost.py), so that every placement on a grid about the outline is looked at, and the best
-ones are refined. ``benchmarks/placement.py`` holds the answer against far finer grids.
+The thesis solves (3.16)-(3.19) by a local method. Here the whole outline is searched. With the
+places given, the forces are a convex problem that is solved in a fraction of a millisecond
+(tracking_cost.py). Every placement on a grid about the outline is looked at, and the best ones are
+refined. The result is the best known placement. ``placement_bound.py`` bounds all others from
+below, and ``benchmarks/placement.py`` prints the gap and compares with far finer grids.
 """
 
 import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from grasp_opt.contact_outline import ContactOutline, Contacts
 from grasp_opt.object_trajectory import ObjectTrajectory
+from grasp_opt.placement_settings import PlacementSettings as PlacementSettings
 from grasp_opt.slices import Work, finish
 from grasp_opt.tracking_cost import placement_cost
 from grasp_opt.wrench_cone import HELD, margin, margins, task_wrenches, wrench_rays
 from push_model.arrays import Array, Mask
-from push_model.settings import bounded, settings
 from push_model.specs import ObjectSpec
 
 _GRID = {1: 96, 2: 60, 3: 24, 4: 16, 5: 13}  # places about the outline, by the number of robots
@@ -42,30 +42,6 @@ _SLOWEST = 0.05  # of the greatest pace: at rest no force would move anything
 
 class NoPlacement(Exception):
     """Raised when robots find no room beside each other, or hold the task nowhere."""
-
-
-@settings
-class PlacementSettings:
-    """Weights of (3.16) and room between robots."""
-
-    model: Literal["limit_surface", "printed"] = bounded(
-        "limit_surface", doc="how the object moves: under its limit surface, or (3.17) as printed"
-    )
-    steps: int = bounded(50, low=5, high=1000, doc="N of (3.16)")
-    position_weight: float = bounded(1e4, low=1e-6, high=1e9, doc="[1/m^2] Q")
-    orientation_weight: float = bounded(200.0, low=0.0, high=1e9, doc="[1/rad^2] Q")
-    force_weight: float = bounded(0.05, low=1e-9, high=1e9, doc="R, of forces over the floor's")
-    gap: float = bounded(5e-3, low=0.0, high=1.0, doc="[m] between robots")
-    corner: float = bounded(0.015, low=0.0, high=1.0, doc="[m] between contacts and corners")
-    least_margin: float = bounded(
-        -1.0, low=-1.0, high=1.0, doc="of the compatibility test, that a placement must have"
-    )
-    only_pushing: bool = bounded(
-        False, doc="whether every contact must move towards the object all along the task"
-    )
-    most_force: float = bounded(
-        1e6, low=1e-3, high=1e6, doc="[N] that a robot may have to exert, its traction"
-    )
 
 
 @dataclass(frozen=True)

@@ -40,17 +40,51 @@ _PARTS = (1.0, 0.75, 0.5, 0.35, 0.25, 0.15, 0.08)  # of a trajectory that no pla
 class StepSettings:
     """Room, speeds, and how sure a placement must be."""
 
-    room: float = bounded(0.03, low=0.0, high=1.0, doc="[m] about the object beside a robot's size")
-    clearance: float = bounded(0.01, low=0.0, high=1.0, doc="[m] of robots from everything")
-    gap: float = bounded(0.015, low=0.0, high=1.0, doc="[m] between robots that push a piece")
-    standoff: float = bounded(0.012, low=1e-3, high=0.5, doc="[m] from a place to where it is met")
-    back: float = bounded(0.05, low=0.0, high=1.0, doc="[m] straight on at the end of a way there")
-    speed: float = bounded(0.05, low=1e-3, high=5.0, doc="[m/s] of the object's farthest point")
-    acceleration: float = bounded(0.05, low=1e-3, high=50.0, doc="[m/s^2] likewise")
-    force_share: float = bounded(0.85, low=0.1, high=1.0, doc="of its traction that a robot gives")
-    margin: float = bounded(0.1, low=0.0, high=1.0, doc="of the compatibility test that is enough")
-    steps: int = bounded(8, low=5, high=1000, doc="N of (3.16) for a piece, which is one wrench")
-    longest: float = bounded(1.5, low=0.05, high=100.0, doc="[m] of a piece; then all look again")
+    room: float = bounded(
+        0.03,
+        low=0.0,
+        high=1.0,
+        doc="free space wanted around the object in addition to a robot diameter (m)",
+    )
+    clearance: float = bounded(
+        0.01, low=0.0, high=1.0, doc="least clearance of robots on their paths (m)"
+    )
+    gap: float = bounded(
+        0.015, low=0.0, high=1.0, doc="least gap between robots that push together (m)"
+    )
+    standoff: float = bounded(
+        0.012,
+        low=1e-3,
+        high=0.5,
+        doc="distance from the object at which robots wait before contact (m)",
+    )
+    back: float = bounded(
+        0.05, low=0.0, high=1.0, doc="straight last part of the path to a place at the object (m)"
+    )
+    speed: float = bounded(
+        0.05, low=1e-3, high=5.0, doc="greatest speed of any point of the object (m/s)"
+    )
+    acceleration: float = bounded(
+        0.05, low=1e-3, high=50.0, doc="greatest acceleration of any point of the object (m/s^2)"
+    )
+    force_share: float = bounded(
+        0.85, low=0.1, high=1.0, doc="fraction of its traction that a robot may use"
+    )
+    margin: float = bounded(
+        0.1,
+        low=0.0,
+        high=1.0,
+        doc="margin of the compatibility test that makes more robots unnecessary, a sine",
+    )
+    steps: int = bounded(
+        8, low=5, high=1000, doc="number N of time steps of (3.16) for a piece with one twist"
+    )
+    longest: float = bounded(
+        1.5,
+        low=0.05,
+        high=100.0,
+        doc="longest piece of the way before the next step is planned (m)",
+    )
 
 
 class TooFew(NoStep):
