@@ -97,6 +97,22 @@ class GroupControlSettings:
     )
 
 
+PRINTED_LAW = GroupControlSettings(
+    law="printed",
+    position_gain=1000.0,
+    orientation_gain=100.0,
+    force_gain=0.09,
+    place_gain=1.0,
+)
+"""Gains with which (3.25) as printed works: a push ahead of some robots on flat sides, or of two on
+the ellipse, at 0.05 m/s.
+
+Sliding friction does not depend on speed, so that the printed law goes at ``force_gain`` times a
+robot's share of it, whatever the trajectory asks for. Only errors of the object, through stiff
+gains of (3.20), bring it to the trajectory's speed. Robots move along their forces, not with the
+object: on turns, and where robots on a curved outline carry unlike forces, they come apart."""
+
+
 @dataclass(frozen=True)
 class GroupCommand:
     """What one tick asks for.
