@@ -36,29 +36,81 @@ class GroupControlSettings:
     """Gains of (3.20) and (3.25)."""
 
     law: Literal["twist", "printed"] = bounded(
-        "twist", doc="robots follow the object's feasible twist, or their forces as in (3.25)"
+        "twist", doc="control law: robots follow the object's feasible twist, or (3.25) as printed"
     )
-    position_gain: float = bounded(40.0, low=0.0, high=1e4, doc="[N/m] K_P of (3.20)")
-    orientation_gain: float = bounded(6.0, low=0.0, high=1e4, doc="[Nm/rad] K_P of (3.20)")
-    velocity_gain: float = bounded(2.0, low=0.0, high=1e4, doc="[Ns/m] K_D of (3.20)")
-    turning_gain: float = bounded(0.1, low=0.0, high=1e4, doc="[Nms/rad] K_D of (3.20)")
+    position_gain: float = bounded(
+        40.0, low=0.0, high=1e4, doc="gain K_P of (3.20) on position errors of the object (N/m)"
+    )
+    orientation_gain: float = bounded(
+        6.0,
+        low=0.0,
+        high=1e4,
+        doc="gain K_P of (3.20) on orientation errors of the object (Nm/rad)",
+    )
+    velocity_gain: float = bounded(
+        2.0, low=0.0, high=1e4, doc="gain K_D of (3.20) on velocity errors of the object (Ns/m)"
+    )
+    turning_gain: float = bounded(
+        0.1, low=0.0, high=1e4, doc="gain K_D of (3.20) on turn rate errors of the object (Nms/rad)"
+    )
     place_gain: float = bounded(
-        0.05, low=0.0, high=100.0, doc="[1/s] K_PR of (3.25), along the outline"
+        0.05,
+        low=0.0,
+        high=100.0,
+        doc="gain K_PR of (3.25) on a robot position along the outline (1/s)",
     )
-    gap_gain: float = bounded(2.0, low=0.0, high=100.0, doc="[1/s] K_PR towards the object")
+    gap_gain: float = bounded(
+        2.0, low=0.0, high=100.0, doc="gain on the gap between a robot and the object (1/s)"
+    )
     lost: float = bounded(
-        5e-3, low=1e-4, high=1.0, doc="[m] from the object at which a robot carries nothing"
+        5e-3, low=1e-4, high=1.0, doc="gap from which a robot counts as out of contact (m)"
     )
     approach: float = bounded(
-        0.02, low=0.0, high=1.0, doc="[m/s] at most towards the object, besides its own speed"
+        0.02,
+        low=0.0,
+        high=1.0,
+        doc="greatest speed of a robot relative to the object when it closes a gap (m/s)",
     )
-    force_gain: float = bounded(0.002, low=0.0, high=10.0, doc="[m/s/N] K_VR of (3.25)")
+    force_gain: float = bounded(
+        0.002,
+        low=0.0,
+        high=10.0,
+        doc="gain K_VR of (3.25) from contact force to robot speed (m/s/N)",
+    )
     correction: float = bounded(
-        2.0, low=1.0, high=10.0, doc="times the task's own speed that corrections may ask for"
+        2.0,
+        low=1.0,
+        high=10.0,
+        doc="greatest object speed under corrections, as a multiple of the trajectory speed",
     )
-    apart: float = bounded(8e-3, low=0.0, high=1.0, doc="[m] between robots; nearer, they part")
-    apart_gain: float = bounded(0.5, low=0.0, high=100.0, doc="[1/s] of what is lacking of it")
-    lead: float = bounded(0.025, low=1e-3, high=1.0, doc="[m] of the controlled point ahead")
+    apart: float = bounded(
+        8e-3, low=0.0, high=1.0, doc="gap between two robots below which they are driven apart (m)"
+    )
+    apart_gain: float = bounded(
+        0.5, low=0.0, high=100.0, doc="separation speed per missing gap between two robots (1/s)"
+    )
+    lead: float = bounded(
+        0.025, low=1e-3, high=1.0, doc="distance of the controlled point ahead of the axle (m)"
+    )
+    pose_delay: float = bounded(
+        0.0, low=0.0, high=1.0, doc="latency of the pose stream, from measurement to command (s)"
+    )
+
+
+PRINTED_LAW = GroupControlSettings(
+    law="printed",
+    position_gain=1000.0,
+    orientation_gain=100.0,
+    force_gain=0.09,
+    place_gain=1.0,
+)
+"""Gains with which (3.25) as printed works: a push ahead of some robots on flat sides, or of two on
+the ellipse, at 0.05 m/s.
+
+Sliding friction does not depend on speed, so that the printed law goes at ``force_gain`` times a
+robot's share of it, whatever the trajectory asks for. Only errors of the object, through stiff
+gains of (3.20), bring it to the trajectory's speed. Robots move along their forces, not with the
+object: on turns, and where robots on a curved outline carry unlike forces, they come apart."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +119,8 @@ class GroupCommand:
 
     wrench ``(3,)`` in the object's frame; forces ``(n, 2)`` [N] likewise; lacking: part of the
     wrench that they do not make; gaps ``(n,)`` [m] between robots and object; contacts: where the
-    robots are now; velocities ``(n, 2)`` [m/s] of robots in the world's frame.
+    robots are now; velocities ``(n, 2)`` [m/s] of robots in the world's frame; twist ``(3,)`` that
+    the forces give the object, in its frame.
     """
 
     wrench: Array
@@ -76,6 +129,7 @@ class GroupCommand:
     gaps: Array
     contacts: Contacts
     velocities: Array
+    twist: Array
 
 
 def distribute(wrench: Array, contacts: Contacts, friction: float, length: float) -> Array:
@@ -135,7 +189,13 @@ class GroupController:
         return unit
 
     def command(
-        self, pose: Array, twist: Array, wanted: Array, wanted_twist: Array, robots: Array
+        self,
+        pose: Array,
+        twist: Array,
+        wanted: Array,
+        wanted_twist: Array,
+        robots: Array,
+        headings: Array | None = None,
     ) -> GroupCommand:
         """One tick.
 
@@ -168,16 +228,26 @@ class GroupController:
         size = float(np.linalg.norm(wrench / scale))
         lacking = float(np.linalg.norm((wrench - made) / scale)) / size if size > 0.0 else 0.0
         off_place = s.place_gain * (self.places - local)
+        pushed = self._feasible(made, task)
         if s.law == "printed":
             moved = off_place + s.force_gain * forces
         else:
             normals = contacts.normals
-            moved = point_velocities(self._feasible(made, task), local)
+            moved = point_velocities(pushed, local + self._ahead_of(pose, headings))
             moved += off_place - (off_place * normals).sum(axis=1)[:, None] * normals
             moved += self._inward(gaps, forces, normals, touching)[:, None] * normals
         self._keep_apart(moved, local)
         world = se2.rotation_matrix(float(pose[2]))
-        return GroupCommand(wrench, forces, lacking, gaps, contacts, moved @ world.T)
+        velocities = moved @ world.T
+        return GroupCommand(wrench, forces, lacking, gaps, contacts, velocities, pushed)
+
+    def _ahead_of(self, pose: Array, headings: Array | None) -> Array:
+        """``(n, 2)`` [m] from the robots' centres to their controlled points, in the frame of an
+        object at a pose ``(3,)``; zero where no headings are given."""
+        if headings is None:
+            return np.zeros(2)
+        angles = headings - pose[2]
+        return self.settings.lead * np.column_stack([np.cos(angles), np.sin(angles)])
 
     def _keep_apart(self, moved: Array, local: Array) -> None:
         """Let robots at ``local (n, 2)`` that come too close to each other part again, by changing

@@ -5,17 +5,18 @@ and back off; then the next one. What goes wrong in a step is met by planning th
 that does not move although it is told to is left where it is, and the others go on without it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from grasp_opt.contact_outline import ContactOutline
 from grasp_opt.group_control import GroupControlSettings
 from grasp_opt.group_push import GroupPush, GroupPushSettings, GroupStep, Phase
+from grasp_opt.job_state import MoveWatch, Step, Tally, Task
 from grasp_opt.moves import Mover, MoveSettings, back_off
 from grasp_opt.object_trajectory import ObjectTrajectory
+from grasp_opt.prediction import GroupPrediction
 from grasp_opt.step_planner import GroupPlan
-from push_estimation.actuation_monitor import ActuationMonitor
 from push_model import se2
 from push_model.arrays import Array
 from push_model.jobs import JobError, JobPhase
@@ -27,11 +28,22 @@ from push_model.specs import ObjectSpec, RobotSpec
 class GroupJobSettings:
     """When a job is done, and when it is given up."""
 
-    position_tolerance: float = bounded(5e-3, low=1e-4, high=1.0, doc="[m] of the goal")
-    orientation_tolerance: float = bounded(0.03, low=1e-3, high=3.2, doc="[rad] likewise")
-    failures: int = bounded(4, low=0, high=100, doc="steps that may go wrong one after the other")
-    steps: int = bounded(40, low=1, high=1000, doc="at most")
-    moving: float = bounded(180.0, low=1.0, high=3600.0, doc="[s] at most between two pushes")
+    position_tolerance: float = bounded(
+        5e-3, low=1e-4, high=1.0, doc="distance to the goal position at which a job is done (m)"
+    )
+    orientation_tolerance: float = bounded(
+        0.03, low=1e-3, high=3.2, doc="angle to the goal orientation at which a job is done (rad)"
+    )
+    failures: int = bounded(
+        4, low=0, high=100, doc="consecutive failed steps after which the next failure ends the job"
+    )
+    steps: int = bounded(40, low=1, high=1000, doc="greatest number of pushes in a job")
+    moving: float = bounded(
+        180.0,
+        low=1.0,
+        high=3600.0,
+        doc="time limit for robots to reach their places between two pushes (s)",
+    )
 
 
 @dataclass(frozen=True)
@@ -51,8 +63,8 @@ class GroupJob:
     """One job at a time of ``count`` robots of one type.
 
     state, reason, error: as in JobState. request: a step to be planned, answered by ``planned`` or
-    ``failed``. dead: robots that do not move. pushes, replans: of this job; left: pieces that the
-    last plan had; last: what the last tick of a push came from.
+    ``failed``. dead: indices of robots that do not move. Poses are those of the frame that is
+    answered; ``pose_delay`` later they are no longer true, which the job makes good.
     """
 
     def __init__(
@@ -65,51 +77,86 @@ class GroupJob:
         control: GroupControlSettings | None = None,
         moves: MoveSettings | None = None,
     ) -> None:
-        self.settings = settings or GroupJobSettings()
+        """item, robot: as believed."""
+        self.settings = s = settings or GroupJobSettings()
         self._item, self._robot, self._count = item, robot, count
         self._push_settings = push or GroupPushSettings()
-        self._control, self._moves = control, moves or MoveSettings()
+        self._control, self._moves = control or GroupControlSettings(), moves or MoveSettings()
         self._outline = ContactOutline(item.geometry)
         self.state, self.reason, self.error = JobPhase.IDLE, "waiting for a goal", JobError.NONE
-        self.goal: Array | None = None
         self.request: Request | None = None
         self.dead: tuple[int, ...] = ()
-        self.pushes = self.replans = self.left = 0
-        self.plan: GroupPlan | None = None
-        self.last: GroupStep | None = None
-        self._failures = 0
-        self._revived = False
-        self._along: ObjectTrajectory | None = None  # what is left of the one that was given
-        self._following = False
-        self._fewest = 0  # robots that are to push at least: fewer have failed
-        self._push: GroupPush | None = None
-        self._mover: Mover | None = None
-        self._watch: ActuationMonitor | None = None
-        self._since = 0.0
+        self._task, self._tally, self._step = Task(), Tally(), Step()
+        p = self._push_settings
+        self._watch = MoveWatch(count, p.dead, p.dead_way, s.moving)
+        self._prediction = GroupPrediction(count, self._control.pose_delay)
 
     @property
     def busy(self) -> bool:
         """Whether a job is under way."""
         return self.state is not JobPhase.IDLE
 
+    @property
+    def goal(self) -> Array | None:
+        """``(3,)`` of the centre of mass, of the last job; None before the first one."""
+        return self._task.goal
+
+    @property
+    def pushes(self) -> int:
+        """Pushes of this job that were begun."""
+        return self._tally.pushes
+
+    @property
+    def replans(self) -> int:
+        """Steps of this job that were planned anew because one failed."""
+        return self._tally.replans
+
+    @property
+    def left(self) -> int:
+        """Pieces of the way that the last plan had, less those that are done."""
+        return self._tally.left
+
+    @property
+    def plan(self) -> GroupPlan | None:
+        """The last step that was planned."""
+        return self._step.plan
+
+    @property
+    def last(self) -> GroupStep | None:
+        """The last tick of the push under way; None between pushes."""
+        return self._step.last
+
+    @property
+    def pose_delay(self) -> float:
+        """[s] from the measurement of a frame to the command that answers it; may change at any
+        time."""
+        return self._prediction.delay
+
+    @pose_delay.setter
+    def pose_delay(self, seconds: float) -> None:
+        self._prediction.delay = seconds
+        self._control = replace(self._control, pose_delay=seconds)
+        if self._step.push is not None:
+            self._step.push.pose_delay = seconds
+
     def begin(self, goal: Array) -> None:
         """Take a goal ``(3,)`` of the centre of mass; no job is under way."""
-        self.goal, self.error = goal, JobError.NONE
-        self.pushes = self.replans = self._failures = self.left = 0
-        self.plan, self._along, self._revived = None, None, False
-        self._following, self._fewest = False, 0
-        self._enter(JobPhase.DETACHING, "robots come away from the object")
+        self._begin(Task(goal))
 
     def begin_along(self, trajectory: ObjectTrajectory) -> None:
         """Take a trajectory of the centre of mass instead: one push, or several where the robots
         must change places on it."""
-        self.begin(trajectory.pose[-1])
-        self._along, self._following = trajectory, True
+        self._begin(Task(trajectory.pose[-1], trajectory, True))
+
+    def _begin(self, task: Task) -> None:
+        self.error = JobError.NONE
+        self._task, self._tally, self._step = task, Tally(), Step()
+        self._enter(JobPhase.DETACHING, "robots come away from the object")
 
     def end(self, code: JobError, message: str) -> None:
         """End the job under way."""
         if self.busy:
-            self.error, self.request, self.last = code, None, None
+            self.error, self.request = code, None
             self._enter(JobPhase.IDLE, message)
 
     def revive(self) -> None:
@@ -122,15 +169,15 @@ class GroupJob:
             return
         self._item, self._robot = item, robot
         self._outline = ContactOutline(item.geometry)
-        if self._push is not None:
-            self._push.believe(item, robot)
+        if self._step.push is not None:
+            self._step.push.believe(item, robot)
 
     def planned(self, plan: GroupPlan) -> None:
         """The answer to a request."""
         if self.request is None:
             return
-        self.request, self.plan, self.left = None, plan, plan.left
-        self._mover = Mover(plan.batches, self._robot.differential, self._moves)
+        self.request, self._tally.left = None, plan.left
+        self._step = Step(plan, Mover(plan.batches, self._robot.differential, self._moves))
         count = len(plan.pushers)
         self._enter(JobPhase.POSITIONING, f"{count} robots go to their places")
 
@@ -139,45 +186,62 @@ class GroupJob:
         if self.request is None:
             return
         self.request = None
-        if self.dead and not self._revived:
-            self._revived = True
+        if self.dead and not self._tally.revived:
+            self._tally.revived = True
             self.dead = ()
             self._enter(JobPhase.DETACHING, f"{message}; those that did not move are tried again")
             return
         self.end(code, message)
 
+    def rest(self, now: float) -> None:
+        """A frame at a time [s] that is answered with zero commands, as when a pose is missing."""
+        self._prediction.frame(now)
+        self._prediction.answer(np.zeros((self._count, 2)))
+        if self._step.push is not None:
+            self._step.push.rest(now)
+
     def step(self, now: float, pose: Array, robots: Array) -> Array:
-        """Twists ``(n, 2)`` of a tick. pose ``(3,)`` of the centre of mass, robots ``(n, 3)``."""
+        """Twists ``(n, 2)`` v [m/s], omega [rad/s] of a tick.
+
+        Parameters
+        ----------
+        now: [s] stamp of the frame. pose ``(3,)`` of the centre of mass, robots ``(n, 3)``: in it.
+        """
+        self._prediction.frame(now)
+        twists = self._tick(now, pose, robots)
+        self._prediction.answer(twists)
+        return twists
+
+    def _tick(self, now: float, pose: Array, robots: Array) -> Array:
         if self.state in (JobPhase.IDLE, JobPhase.PLANNING):
-            self._since = now
+            self._watch.since = now
             return np.zeros((self._count, 2))
-        if self.state is JobPhase.DETACHING:
-            twists = self._detach(pose, robots)
-        elif self.state is JobPhase.POSITIONING:
-            twists = self._go(now, pose, robots)
-        else:
+        if self.state in (JobPhase.APPROACH, JobPhase.PUSHING):
             return self._push_on(now, pose, robots)
+        there = self._prediction.robots(robots)
+        if self.state is JobPhase.DETACHING:
+            twists = self._detach(pose, there)
+        else:
+            twists = self._go(pose, there)
         return twists if self._obeyed(now, robots, twists) else 0.0 * twists
 
     def _enter(self, state: JobPhase, reason: str) -> None:
         self.state, self.reason = state, reason
-        self._watch = ActuationMonitor(
-            self._count, self._push_settings.dead, self._push_settings.dead_way
-        )
+        self._watch.renew()
         if state is not JobPhase.POSITIONING:
-            self._mover = None
+            self._step.mover = None
         if state not in (JobPhase.APPROACH, JobPhase.PUSHING):
-            self._push = self.last = None
+            self._step.push = self._step.last = None
 
     def _obeyed(self, now: float, robots: Array, twists: Array) -> bool:
-        """Whether all do as they are told; else the step is planned anew without who does not."""
-        assert self._watch is not None
-        told = self._watch.step(now, robots, twists)
-        late = now - self._since > self.settings.moving
-        if not told and not late:
+        """Whether all robots move as commanded; else the step is planned anew without the others.
+
+        robots ``(n, 3)``: as measured. Predicted poses contain the commands themselves.
+        """
+        still, late = self._watch.step(now, robots, twists)
+        if not still and not late:
             return True
-        self._since = now
-        self._lost(told, "robots take too long to their places" if late else "")
+        self._lost(still, "robots take too long to their places" if late else "")
         return False
 
     def _lost(self, dead: tuple[int, ...], reason: str) -> None:
@@ -187,9 +251,9 @@ class GroupJob:
             reason = f"going on without {len(self.dead)} of {self._count} robots: " + (
                 reason or "it does not move although told to"
             )
-        self._failures += 1
-        self.replans += 1
-        if self._failures > self.settings.failures or (self._following and self.pushes):
+        tally = self._tally
+        tally.failed()
+        if tally.failures > self.settings.failures or (self._task.following and tally.pushes):
             self.end(JobError.EXECUTION_FAILED, reason)
             return
         self._enter(JobPhase.DETACHING, reason)
@@ -209,69 +273,61 @@ class GroupJob:
 
     def _look(self, pose: Array, robots: Array) -> None:
         """At the goal, or what next."""
-        assert self.goal is not None
-        off = se2.between(self.goal, pose)
+        task, tally, s = self._task, self._tally, self.settings
+        assert task.goal is not None
+        off = se2.between(task.goal, pose)
         away, turned = float(np.hypot(off[0], off[1])), abs(float(off[2]))
-        s = self.settings
         if away <= s.position_tolerance and turned <= s.orientation_tolerance:
             self.end(JobError.NONE, f"at the goal: {1e3 * away:.1f} mm, {turned:.3f} rad")
             return
-        if self.pushes >= s.steps or (self._following and self._along is None):
-            text = f"{1e3 * away:.1f} mm and {turned:.3f} rad off after {self.pushes} pushes"
+        if tally.pushes >= s.steps or task.over:
+            text = f"{1e3 * away:.1f} mm and {turned:.3f} rad off after {tally.pushes} pushes"
             self.end(JobError.OFF_TARGET, text)
             return
         self._enter(JobPhase.PLANNING, "planning the next step")
         self.request = Request(
-            pose.copy(), self.goal, robots.copy(), self.dead, self._along, self._fewest
+            pose.copy(), task.goal, robots.copy(), self.dead, task.along, tally.fewest
         )
 
-    def _go(self, now: float, pose: Array, robots: Array) -> Array:
-        assert self._mover is not None and self.plan is not None
-        twists = self._mover.step(robots)
-        if not self._mover.done:
+    def _go(self, pose: Array, robots: Array) -> Array:
+        mover, plan = self._step.mover, self._step.plan
+        assert mover is not None and plan is not None
+        twists = mover.step(robots)
+        if not mover.done:
             return twists
-        gone = se2.between(self.plan.trajectory.pose[0], pose)
+        gone = se2.between(plan.trajectory.pose[0], pose)
         if np.hypot(gone[0], gone[1]) > 0.02 or abs(gone[2]) > 0.1:
             self._lost((), "the object was moved while robots went to their places")
             return 0.0 * twists
-        self._push = GroupPush(
+        self._step.push = GroupPush(
             self._item,
             self._robot,
-            self.plan.placement.way,
-            self.plan.trajectory,
+            plan.placement.way,
+            plan.trajectory,
             self._push_settings,
             self._control,
         )
-        self._enter_push(JobPhase.APPROACH, "robots look for contact")
+        self._enter(JobPhase.APPROACH, "robots look for contact")
         return 0.0 * twists
 
-    def _enter_push(self, state: JobPhase, reason: str) -> None:
-        push = self._push
-        self._enter(state, reason)
-        self._push = push
-
     def _push_on(self, now: float, pose: Array, robots: Array) -> Array:
-        assert self._push is not None and self.plan is not None
-        pushers = list(self.plan.pushers)
-        step = self._push.step(now, pose, robots[pushers])
-        self.last = step
+        push, plan = self._step.push, self._step.plan
+        assert push is not None and plan is not None
+        pushers = list(plan.pushers)
+        step = self._step.last = push.step(now, pose, robots[pushers])
         twists = np.zeros((self._count, 2))
         twists[pushers] = step.twists
         if step.phase is Phase.PUSH and self.state is JobPhase.APPROACH:
-            self.pushes += 1
-            self._enter_push(JobPhase.PUSHING, f"{len(pushers)} robots push")
-            self.last = step
+            self._tally.pushes += 1
+            self._enter(JobPhase.PUSHING, f"{len(pushers)} robots push")
         elif step.phase is Phase.DONE:
-            self._failures = 0
-            self.left = max(0, self.left - 1)
-            if self._along is not None:
-                begin, end = self.plan.trajectory.duration, self._along.duration
-                self._along = self._along.between(begin, end) if self.left else None
-            self._since = now
+            self._tally.pushed()
+            self._task.done_until(plan.trajectory.duration, more=self._tally.left > 0)
+            self._watch.since = now
             self._enter(JobPhase.DETACHING, "the piece is done")
         elif step.phase is Phase.FAILED:
-            self._since = now
-            # Who was only held fast moves when it backs off; who does not is dead.
-            self._fewest = len(pushers) + 1
+            self._watch.since = now
+            # A robot that was only held fast moves when it backs off; one that does not is dead.
+            self._tally.fewest = len(pushers) + 1
             self._lost((), step.reason)
         return twists

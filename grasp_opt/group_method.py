@@ -16,7 +16,7 @@ from push_job.method import Arena, Certificate, MethodSpec, Refusal, Seen, Task,
 from push_job.report import Drawable, Figure, Report, Status, arrows, discs, polyline
 from push_model import se2
 from push_model.arrays import Array
-from push_model.belief import Belief
+from push_model.belief import POSES, Belief
 from push_model.bumpers import RingBumper
 from push_model.drives import SpeedDrive
 from push_model.free_space import FreeSpace, Obstacles
@@ -119,6 +119,7 @@ class GroupMethod:
         """See Method: robots stand while one of them is not seen."""
         self._take_up(belief)
         if any(n not in seen.robots for n in self._names):
+            self.job.rest(seen.time)
             return Told()
         planning = self._see_to_plans(seen, belief)
         pose = self._item.mass_pose(seen.object)
@@ -239,6 +240,8 @@ class GroupMethod:
             self._finder = WayFinder(space, item.geometry.outline, 0.0)
         self._item = item
         self.job.believe(item, robot)
+        if (POSES, "latency") in belief.values:
+            self.job.pose_delay = belief.latency.value
 
 
 def _trajectory(task: Task, item: ObjectSpec) -> ObjectTrajectory:

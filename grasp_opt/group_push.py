@@ -18,6 +18,7 @@ from grasp_opt.group_control import (
     GroupControlSettings,
 )
 from grasp_opt.object_trajectory import ObjectTrajectory
+from grasp_opt.prediction import GroupPrediction
 from push_estimation.actuation_monitor import ActuationMonitor
 from push_estimation.velocity_filter import VelocityFilter
 from push_model import se2
@@ -32,21 +33,72 @@ _GAP = 0.2  # [s] between ticks from which on they are no longer one after the o
 class GroupPushSettings:
     """What is taken for contact, for progress and for failure."""
 
-    contact: float = bounded(1e-3, low=1e-5, high=0.1, doc="[m] of a gap that counts as contact")
-    steady: float = bounded(0.1, low=0.0, high=10.0, doc="[s] that all must be in contact")
-    search: float = bounded(8.0, low=0.1, high=600.0, doc="[s] at most until all have contact")
-    behind: float = bounded(
-        0.01, low=1e-4, high=1.0, doc="[m] of error from which the trajectory waits, up to twice it"
+    contact: float = bounded(
+        1e-3,
+        low=1e-5,
+        high=0.1,
+        doc="gap between a robot and the object that counts as contact (m)",
     )
-    position_error: float = bounded(0.05, low=1e-3, high=10.0, doc="[m] at which the push fails")
-    orientation_error: float = bounded(0.3, low=0.01, high=7.0, doc="[rad] likewise")
-    stalled: float = bounded(4.0, low=0.1, high=600.0, doc="[s] without progress, likewise")
-    dead: float = bounded(1.0, low=0.1, high=60.0, doc="[s] that a robot may not do as told")
-    dead_way: float = bounded(0.01, low=1e-4, high=1.0, doc="[m] that it should have gone then")
-    position_noise: float = bounded(2e-4, low=1e-6, high=0.1, doc="[m] of poses, for the filter")
-    orientation_noise: float = bounded(1.7e-3, low=1e-6, high=0.5, doc="[rad] likewise")
-    acceleration: float = bounded(0.3, low=1e-3, high=100.0, doc="[m/s^2] of the object, likewise")
-    turning: float = bounded(1.5, low=1e-3, high=1000.0, doc="[rad/s^2] likewise")
+    steady: float = bounded(
+        0.1,
+        low=0.0,
+        high=10.0,
+        doc="time for which all robots must be in contact before a push begins (s)",
+    )
+    search: float = bounded(
+        8.0, low=0.1, high=600.0, doc="time limit for all robots to make contact (s)"
+    )
+    behind: float = bounded(
+        0.01,
+        low=1e-4,
+        high=1.0,
+        doc="object error from which the trajectory slows down; it stops at twice this (m)",
+    )
+    position_error: float = bounded(
+        0.05, low=1e-3, high=10.0, doc="position error of the object at which a push fails (m)"
+    )
+    orientation_error: float = bounded(
+        0.3, low=0.01, high=7.0, doc="orientation error of the object at which a push fails (rad)"
+    )
+    stalled: float = bounded(
+        4.0, low=0.1, high=600.0, doc="time without progress after which a push fails (s)"
+    )
+    dead: float = bounded(
+        1.0,
+        low=0.1,
+        high=60.0,
+        doc="time without commanded motion after which a robot is considered dead (s)",
+    )
+    dead_way: float = bounded(
+        0.01,
+        low=1e-4,
+        high=1.0,
+        doc="least commanded path in that time for a robot to be judged dead or alive (m)",
+    )
+    position_noise: float = bounded(
+        2e-4,
+        low=1e-6,
+        high=0.1,
+        doc="standard deviation of measured positions, for the velocity filter (m)",
+    )
+    orientation_noise: float = bounded(
+        1.7e-3,
+        low=1e-6,
+        high=0.5,
+        doc="standard deviation of measured headings, for the velocity filter (rad)",
+    )
+    acceleration: float = bounded(
+        0.3,
+        low=1e-3,
+        high=100.0,
+        doc="standard deviation of object acceleration, for the velocity filter (m/s^2)",
+    )
+    turning: float = bounded(
+        1.5,
+        low=1e-3,
+        high=1000.0,
+        doc="standard deviation of object angular acceleration, for the velocity filter (rad/s^2)",
+    )
 
 
 class Phase(Enum):
@@ -101,6 +153,7 @@ class GroupPush:
         self._filter = VelocityFilter(
             s.position_noise, s.orientation_noise, s.acceleration, s.turning
         )
+        self._prediction = GroupPrediction(len(ways), self.controller.settings.pose_delay)
         self._obedience = ActuationMonitor(len(ways), s.dead, s.dead_way)
         self._begin: float | None = None
         self._last = 0.0
@@ -120,6 +173,21 @@ class GroupPush:
             self.controller.settings,
         )
 
+    @property
+    def pose_delay(self) -> float:
+        """[s] from the measurement of a frame to the command that answers it; may change at any
+        time."""
+        return self._prediction.delay
+
+    @pose_delay.setter
+    def pose_delay(self, seconds: float) -> None:
+        self._prediction.delay = seconds
+
+    def rest(self, now: float) -> None:
+        """A frame at a time [s] that is answered with zero commands."""
+        self._prediction.frame(now)
+        self._prediction.answer(np.zeros((len(self.ahead), 2)))
+
     def starts(self, pose: Array, off: float) -> Array:
         """``(n, 3)`` poses from which robots come to the object at a pose ``(3,)``, so far [m] from
         where they touch it."""
@@ -128,7 +196,15 @@ class GroupPush:
         return np.column_stack([centres, headings])
 
     def step(self, now: float, pose: Array, robots: Array) -> GroupStep:
-        """One tick. pose ``(3,)`` of the object's centre of mass, robots ``(n, 3)``, at a time."""
+        """One tick. pose ``(3,)`` of the object's centre of mass, robots ``(n, 3)``, as they are in
+        the frame that is answered at a time now [s]."""
+        self._prediction.frame(now)
+        step = self._step(now, pose, robots)
+        pushed = None if step.command is None else step.command.twist
+        self._prediction.answer(step.twists, pushed)
+        return step
+
+    def _step(self, now: float, pose: Array, seen: Array) -> GroupStep:
         s = self.settings
         if self._begin is None:
             self._begin = self._last = self._moved_on = now
@@ -139,7 +215,7 @@ class GroupPush:
             self._moved_on += tick
             tick = 0.0
         self._filter.update(now, pose)
-        estimate = self._filter.pose
+        estimate, robots = self._prediction.item(self._filter.pose), self._prediction.robots(seen)
         searching = self._contact_since is None or now - self._contact_since < s.steady
         if not searching:
             self._go_on(now, tick, estimate)
@@ -155,11 +231,12 @@ class GroupPush:
                 self.trajectory.sample(ahead),
                 self.trajectory.twist_at(ahead),
                 robots[:, :2],
+                robots[:, 2],
             )
             velocities = command.velocities
         lead = self.controller.settings.lead
         twists = self._drive.follow(velocities, robots[:, 2], lead)
-        failure, dead = self._failure(now, estimate, robots, twists, searching)
+        failure, dead = self._failure(now, estimate, seen, twists, searching)
         if failure:
             return GroupStep(Phase.FAILED, 0.0 * twists, command, self.time, failure, dead)
         if not searching and self.time >= self.trajectory.duration:

@@ -17,16 +17,36 @@ from push_model.settings import bounded, settings
 class MoveSettings:
     """Speeds and what counts as there."""
 
-    speed: float = bounded(0.1, low=1e-3, high=5.0, doc="[m/s] on the way")
-    deceleration: float = bounded(0.15, low=1e-3, high=50.0, doc="[m/s^2] towards a corner")
-    turn_rate: float = bounded(2.0, low=1e-2, high=50.0, doc="[rad/s] at most")
-    turn_gain: float = bounded(4.0, low=0.1, high=100.0, doc="[1/s] of heading errors")
-    turn_first: float = bounded(0.12, low=1e-3, high=3.0, doc="[rad] from which it turns, standing")
-    near: float = bounded(3e-3, low=1e-4, high=0.1, doc="[m] that counts as there")
-    straight: float = bounded(0.02, low=1e-3, high=1.0, doc="[rad] that counts as headed right")
-    slowest: float = bounded(0.01, low=1e-4, high=1.0, doc="[m/s] close to a corner")
-    back_off: float = bounded(0.03, low=0.0, high=1.0, doc="[m] from the object after a push")
-    back_speed: float = bounded(0.03, low=1e-3, high=1.0, doc="[m/s] meanwhile")
+    speed: float = bounded(0.1, low=1e-3, high=5.0, doc="speed of robots between pushes (m/s)")
+    deceleration: float = bounded(
+        0.15,
+        low=1e-3,
+        high=50.0,
+        doc="deceleration of robots before a corner of their path (m/s^2)",
+    )
+    turn_rate: float = bounded(
+        2.0, low=1e-2, high=50.0, doc="greatest turn rate of robots between pushes (rad/s)"
+    )
+    turn_gain: float = bounded(4.0, low=0.1, high=100.0, doc="turn rate per heading error (1/s)")
+    turn_first: float = bounded(
+        0.12,
+        low=1e-3,
+        high=3.0,
+        doc="heading error from which a robot stops and turns in place (rad)",
+    )
+    near: float = bounded(
+        3e-3, low=1e-4, high=0.1, doc="distance at which a point of the path counts as reached (m)"
+    )
+    straight: float = bounded(
+        0.02, low=1e-3, high=1.0, doc="heading error at which a turn in place ends (rad)"
+    )
+    slowest: float = bounded(
+        0.01, low=1e-4, high=1.0, doc="least speed near a corner of the path (m/s)"
+    )
+    back_off: float = bounded(
+        0.03, low=0.0, high=1.0, doc="gap to which robots back off from the object after a push (m)"
+    )
+    back_speed: float = bounded(0.03, low=1e-3, high=1.0, doc="speed of robots that back off (m/s)")
 
 
 @dataclass

@@ -1,11 +1,13 @@
 """The grasp optimizer as a ROS node: the PlanGroupPush action.
 
-A plan takes from tenths of a second to some seconds, in which the node does nothing else; robots
-stand meanwhile.
+A plan takes from tenths of a second to some seconds, while the robots stand. It is made in slices
+of some hundredths of a second. Between them the node answers other callbacks, so that a request can
+be cancelled at any time.
 """
 
 import sys
 import time
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,9 +15,11 @@ from nav_msgs.msg import Path
 from rclpy.node import Node
 
 from grasp_opt.group_messages import plan_to_ros, trajectory_from_ros
-from grasp_opt.placement import PlacementSettings
+from grasp_opt.object_trajectory import screw
+from grasp_opt.placement import NoPlacement, PlacementSettings, robust_placement
 from grasp_opt.sequencing import NoStep
-from grasp_opt.step_planner import GroupPlan, StepPlanner, StepSettings, TooFew
+from grasp_opt.slices import Work
+from grasp_opt.step_planner import GroupPlan, Scene, StepPlanner, StepSettings, TooFew
 from push_model.belief import Belief
 from push_model.occupancy import OccupancyGrid as Grid
 from push_model.settings import SettingsError
@@ -34,9 +38,11 @@ from push_ros.qos import LATCHED
 from push_ros.validation import InvalidMessage, planar_pose, stamped_pose
 from push_scenario.scenario import Scenario, load_scenario
 
+_SIGN_OF_LIFE = 0.5  # [s] of wall time between feedback messages
+
 
 class OptimizerNode(Node):
-    """Plans the next step of a group for whoever asks."""
+    """Plans the next step of a group, one request at a time; a new one replaces it."""
 
     def __init__(
         self,
@@ -71,6 +77,8 @@ class OptimizerNode(Node):
         )
         self._grid: Grid | None = None
         self._planner: StepPlanner | None = None
+        self._work: Work[GroupPlan] | None = None
+        self._queued = False  # whether a slice waits for its turn
         self.plans = self.failures = 0
         self.last_time = 0.0
         self.planning_time = 0.0
@@ -89,6 +97,7 @@ class OptimizerNode(Node):
             cancel=lambda: self._fail(PlanGroupPush.Result.CANCELED, "canceled"),
             preempt=lambda request: self._preempt(),
         )
+        self._warm_up()
 
     @property
     def ready(self) -> bool:
@@ -96,11 +105,25 @@ class OptimizerNode(Node):
         return self._grid is not None
 
     def _apply(self, settings: StepSettings) -> None:
+        if self._work is not None:
+            raise SettingsError("the optimizer is busy; change its parameters when it is idle")
         self.settings = settings
         self._planner = None
 
+    def _warm_up(self) -> None:
+        """Load what is compiled before the first request: place two robots for a short push."""
+        ahead = screw(np.zeros(3), np.array([0.1, 0.0, 0.0]), 0.05, 0.05, 0.2)
+        few = replace(self._weights, steps=5)
+        try:
+            robust_placement(self._item, ahead, 2, self._robot.footprint_radius, 1e3, few)
+        except NoPlacement as error:
+            self.get_logger().debug(f"warm-up: {error}")
+
     def _take_map(self, grid: Grid) -> None:
+        """A plan under way on another map is dropped and begun anew."""
         self._grid, self._planner = grid, None
+        if self._work is not None:
+            self._begin(self._request)
 
     def _take_up(self, belief: Belief) -> None:
         """Plan with what is believed of the object and the robots now."""
@@ -112,10 +135,27 @@ class OptimizerNode(Node):
             self._fail(PlanGroupPush.Result.CANCELED, "a new request replaces this one")
 
     def _begin(self, request: Any) -> None:
-        began, cpu = time.monotonic(), time.thread_time()
-        result = PlanGroupPush.Result
+        self._request = request
+        self._began = self._told = time.monotonic()
+        self._work = self._plan(request)
+        self._continue()
+
+    def _continue(self) -> None:
+        """Queue the next slice behind whatever else the executor has to do."""
+        if not self._queued:
+            assert self.executor is not None
+            self._queued = True
+            self.executor.create_task(self._on_slice)
+
+    def _on_slice(self) -> None:
+        self._queued = False
+        if self._work is None:
+            return
+        result, cpu = PlanGroupPush.Result, time.thread_time()
         try:
-            plan = self._plan(request)
+            next(self._work)
+        except StopIteration as end:
+            self._succeed(end.value)
         except TooFew as error:
             self._fail(result.TOO_FEW, str(error))
         except NoStep as error:
@@ -127,41 +167,58 @@ class OptimizerNode(Node):
         except _NoMap as error:
             self._fail(result.NO_MAP, str(error))
         else:
-            self.plans += 1
-            self.last_time = time.monotonic() - began
-            now = 1e-9 * int(self.get_clock().now().nanoseconds)
-            message = plan_to_ros(plan, self.object, list(request.robots), now)
-            self._publisher.publish(message)
-            task = plan.trajectory
-            speed = np.hypot(task.twist[:, 0], task.twist[:, 1])
-            way = Trajectory(task.time, task.pose, np.column_stack([speed, task.twist[:, 2]]))
-            self._path_publisher.publish(path_to_ros([way], now))
-            self._server.finish(PlanGroupPush.Result(plan=message), success=True)
+            now = time.monotonic()
+            if now - self._told > _SIGN_OF_LIFE:
+                self._told = now
+                self._server.feedback(PlanGroupPush.Feedback(elapsed=now - self._began))
+            self._continue()
         self.planning_time += time.thread_time() - cpu
 
-    def _plan(self, request: Any) -> GroupPlan:
+    def _succeed(self, plan: GroupPlan) -> None:
+        self._work = None
+        self.plans += 1
+        self.last_time = time.monotonic() - self._began
+        now = 1e-9 * int(self.get_clock().now().nanoseconds)
+        message = plan_to_ros(plan, self.object, list(self._request.robots), now)
+        self._publisher.publish(message)
+        task = plan.trajectory
+        speed = np.hypot(task.twist[:, 0], task.twist[:, 1])
+        way = Trajectory(task.time, task.pose, np.column_stack([speed, task.twist[:, 2]]))
+        self._path_publisher.publish(path_to_ros([way], now))
+        self._server.finish(PlanGroupPush.Result(plan=message), success=True)
+
+    def _plan(self, request: Any) -> Work[GroupPlan]:
+        """The work on a request.
+
+        Raises
+        ------
+        _NoMap, SettingsError, InvalidMessage: in the first slice, of what is wrong with it. NoStep.
+        """
         if self._grid is None:
             raise _NoMap("no map has been received on /map")
         if request.object not in ("", self.object):
             raise SettingsError(f"unknown object '{request.object}'")
         if not request.robots or len(request.robots) != len(request.places):
             raise InvalidMessage("each robot needs its place")
-        if self._planner is None:
-            self._planner = StepPlanner(
-                self._grid, self._item, self._robot, self.settings, self._weights
-            )
         pose = self._item.mass_pose(planar_pose(request.start, "the start"))
         robots = np.array([planar_pose(p, "a robot") for p in request.places])
         number = {name: i for i, name in enumerate(request.robots)}
         dead = tuple(sorted(number[name] for name in request.dead if name in number))
-        others = circles_from_ros(request.obstacles)
-        if len(request.time):
-            task = trajectory_from_ros(request, self._item)
-            return self._planner.along(task, pose, robots, dead, others, request.fewest)
-        goal = self._item.mass_pose(stamped_pose(request.goal, "the goal"))
-        return self._planner.plan(pose, goal, robots, dead, others, request.fewest)
+        scene = Scene(pose, robots, dead, circles_from_ros(request.obstacles), request.fewest)
+        task = trajectory_from_ros(request, self._item) if len(request.time) else None
+        goal = None if task else self._item.mass_pose(stamped_pose(request.goal, "the goal"))
+        if self._planner is None:
+            self._planner = StepPlanner(
+                self._grid, self._item, self._robot, self.settings, self._weights
+            )
+            yield
+        if task is not None:
+            return (yield from self._planner.planning_along(scene, task))
+        assert goal is not None
+        return (yield from self._planner.planning(scene, goal))
 
     def _fail(self, code: int, message: str) -> None:
+        self._work = None
         self.failures += 1
         self._server.finish(PlanGroupPush.Result(error_code=code, error_msg=message), success=False)
 
@@ -169,6 +226,7 @@ class OptimizerNode(Node):
         return {
             "plans": self.plans,
             "failures": self.failures,
+            "planning": self._work is not None,
             "last plan time": f"{self.last_time:.3f} s",
             "warning": "" if self._grid is not None else "no map yet",
         }

@@ -1,28 +1,27 @@
 """Task-oriented placement of robots round an object (3.2.1): where, and with which forces.
 
-The thesis solves (3.16)-(3.19) by a local method. Here the places are searched for globally: with
-them given, the forces are a convex problem that is solved in a fraction of a millisecond
-(tracking_cost.py), so that every placement on a grid about the outline is looked at, and the best
-ones are refined. ``benchmarks/placement.py`` holds the answer against far finer grids.
+The thesis solves (3.16)-(3.19) by a local method. Here the whole outline is searched. With the
+places given, the forces are a convex problem that is solved in a fraction of a millisecond
+(tracking_cost.py). Every placement on a grid about the outline is looked at, and the best ones are
+refined. The result is the best known placement. ``placement_bound.py`` bounds all others from
+below, and ``benchmarks/placement.py`` prints the gap and compares with far finer grids.
 """
 
 import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Literal
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from grasp_opt.contact_outline import ContactOutline, Contacts
 from grasp_opt.object_trajectory import ObjectTrajectory
-from grasp_opt.selection import apart
-from grasp_opt.tracking_cost import cone_columns, contact_at, tracking_cost
-from grasp_opt.wrench_cone import HELD, margin, task_wrenches, wrench_rays
+from grasp_opt.placement_settings import PlacementSettings as PlacementSettings
+from grasp_opt.slices import Work, finish
+from grasp_opt.tracking_cost import placement_cost
+from grasp_opt.wrench_cone import HELD, margin, margins, task_wrenches, wrench_rays
 from push_model.arrays import Array, Mask
-from push_model.settings import bounded, settings
 from push_model.specs import ObjectSpec
 
 _GRID = {1: 96, 2: 60, 3: 24, 4: 16, 5: 13}  # places about the outline, by the number of robots
@@ -37,35 +36,12 @@ _LAST = 3  # refined to the end
 _MARGINS = (0.1, 0.05, 0.0)  # that are asked for, one after another
 _HELD_AGAINST = 4000  # of the cheapest candidates, to find some that hold the task
 _GOLDEN = 0.6180339887498949
+_SLICE = 100  # placements that are looked at in one slice of the work
 _SLOWEST = 0.05  # of the greatest pace: at rest no force would move anything
 
 
 class NoPlacement(Exception):
     """Raised when robots find no room beside each other, or hold the task nowhere."""
-
-
-@settings
-class PlacementSettings:
-    """Weights of (3.16) and room between robots."""
-
-    model: Literal["limit_surface", "printed"] = bounded(
-        "limit_surface", doc="how the object moves: under its limit surface, or (3.17) as printed"
-    )
-    steps: int = bounded(50, low=5, high=1000, doc="N of (3.16)")
-    position_weight: float = bounded(1e4, low=1e-6, high=1e9, doc="[1/m^2] Q")
-    orientation_weight: float = bounded(200.0, low=0.0, high=1e9, doc="[1/rad^2] Q")
-    force_weight: float = bounded(0.05, low=1e-9, high=1e9, doc="R, of forces over the floor's")
-    gap: float = bounded(5e-3, low=0.0, high=1.0, doc="[m] between robots")
-    corner: float = bounded(0.015, low=0.0, high=1.0, doc="[m] between contacts and corners")
-    least_margin: float = bounded(
-        -1.0, low=-1.0, high=1.0, doc="of the compatibility test, that a placement must have"
-    )
-    only_pushing: bool = bounded(
-        False, doc="whether every contact must move towards the object all along the task"
-    )
-    most_force: float = bounded(
-        1e6, low=1e-3, high=1e6, doc="[N] that a robot may have to exert, its traction"
-    )
 
 
 @dataclass(frozen=True)
@@ -103,8 +79,10 @@ class Placer:
         radius: float,
         settings: PlacementSettings | None = None,
         free: Callable[[Array], Mask] | None = None,
+        candidates: Array | None = None,
     ) -> None:
-        """free: tells of ways ``(n,)`` along the outline where a robot has room.
+        """free: tells of ways ``(n,)`` along the outline where a robot has room. candidates
+        ``(k, n)``: those of another task of as many robots in the same room, where they are known.
 
         Raises ValueError for a number of robots that is not 1 to 5."""
         if count not in _GRID:
@@ -112,12 +90,14 @@ class Placer:
         self.settings = settings or PlacementSettings()
         self.item, self.count, self.radius = item, count, radius
         self._free = free or (lambda way: np.ones(len(way), dtype=np.bool_))
+        self._candidates = candidates
         self.outline = ContactOutline(item.geometry)
         s, surface = self.settings, item.limit_surface()
         self._surface = surface
         twists = trajectory.body_twists
-        self._wrenches = task_wrenches(twists, surface, surface.radius)
-        self._moving = twists[np.linalg.norm(twists, axis=1) > 0.0]
+        size = np.linalg.norm(twists, axis=1)
+        self._moving = _different(twists[size > 0.0] / size[size > 0.0, None])
+        self._wrenches = task_wrenches(self._moving, surface, surface.radius)
         at = np.linspace(0.0, trajectory.duration, s.steps + 1)
         poses = np.array([trajectory.sample(t) for t in at])
         self.steps = np.diff(poses, axis=0)
@@ -147,7 +127,7 @@ class Placer:
         """(3.16) of a placement ``(n,)`` [m] along the outline, over all forces."""
         u, z, new = self._room
         return float(
-            _cost_at(
+            placement_cost(
                 way, *self.outline.arrays, *self.cone, self.scale, self.turn, self.steps,
                 self.weights, self.force_weight, self.size, tolerance, self._contacts,
                 self._columns, u, z, new, self._work,
@@ -156,10 +136,18 @@ class Placer:
 
     def allowed(self, way: Array) -> bool:
         """Whether robots have room at these places, keep apart and off the corners."""
-        s, contacts = self.settings, self.outline.at(way)
-        if self.outline.from_corner(way).min() < s.corner or not self._free(way).all():
-            return False
-        return apart(contacts, self.radius, s.gap)
+        return bool(self._allowed(np.asarray(way)[None])[0])
+
+    def _allowed(self, ways: Array) -> Mask:
+        """``allowed`` of many placements ``(k, n)``."""
+        s, flat = self.settings, ways.ravel()
+        good = (self.outline.from_corner(flat) >= s.corner) & self._free(flat)
+        allowed: Mask = np.all(good.reshape(ways.shape), axis=1)
+        centres = self.outline.at(flat).centres(self.radius).reshape(*ways.shape, 2)
+        for i, j in itertools.combinations(range(ways.shape[1]), 2):
+            away = np.hypot(*(centres[:, i] - centres[:, j]).T)
+            allowed &= away >= 2.0 * self.radius + s.gap
+        return allowed
 
     def holds(self, way: Array) -> bool:
         """Whether a placement has the margin, and asks no robot for more force than it has."""
@@ -207,14 +195,17 @@ class Placer:
         ]
         return at[np.array(chosen, dtype=np.int64).reshape(-1, count)]
 
-    def candidates(self) -> Array:
-        """``(k, n)`` [m] placements from which the best is refined.
+    def candidates(self) -> Work[Array]:
+        """``(k, n)`` [m] placements from which the best is refined, in slices.
 
         Those of a coarse grid; rows of robots side by side, for which a side may have just enough
         room; and for three robots or more, two side by side with the others on the grid.
         """
+        if self._candidates is not None:
+            return self._candidates
         n, total = self.count, self.outline.length
         found = [self.grid(_GRID[n])]
+        yield
         pitch = (2.0 * self.radius + self.settings.gap) * (1.0 + 1e-9)
         centres = np.arange(_CENTRES[n]) / _CENTRES[n] * total
         row = np.arange(n) - 0.5 * (n - 1)
@@ -223,50 +214,85 @@ class Placer:
             others = self.grid(_GRID[n], n - 2)
             pairs = np.arange(_PAIRS)[:, None] / _PAIRS * total + pitch * np.array([[-0.5, 0.5]])
             rows += [np.concatenate([pair, other]) for pair in pairs for other in others]
-        allowed = [way for way in rows if self.allowed(way)]
-        if allowed:
-            found.append(np.array(allowed))
-        return np.mod(np.vstack(found), total)
+        for k in range(0, len(rows), _SLICE):
+            some = np.array(rows[k : k + _SLICE])
+            found.append(some[self._allowed(some)])
+            yield
+        self._candidates = np.mod(np.vstack(found), total)
+        return self._candidates
 
-    def exists(self) -> bool:
-        """Whether any of the candidates holds the task."""
-        candidates = self.candidates()
+    def existing(self) -> Work[bool]:
+        """Whether any of the candidates holds the task, in slices."""
+        candidates, s = (yield from self.candidates()), self.settings
         # Those far apart first: neighbours hold or fail together.
         order = np.argsort(np.mod(np.arange(len(candidates)) * _GOLDEN, 1.0))
-        return any(self.holds(candidates[k]) for k in order)
+        for k in range(0, len(order), _SLICE):
+            some = candidates[order[k : k + _SLICE]]
+            if s.only_pushing:
+                some = some[[self.pushes(way) for way in some]]
+            for way in some[self._margins(some) >= s.least_margin - HELD]:
+                if self.holds(way):
+                    return True
+            yield
+        return False
+
+    def _margins(self, ways: Array) -> Array:
+        """``margin`` of placements ``(k, n)``."""
+        if not len(ways):
+            return np.zeros(0)
+        contacts, shape = self.outline.at(ways.ravel()), (*ways.shape, 2)
+        points, normals = contacts.points.reshape(shape), contacts.normals.reshape(shape)
+        mu, c = self.item.contact_friction, self._surface.radius
+        return margins(wrench_rays(points, normals, mu, c), self._wrenches)
 
     def best(self, points: int = 0, refined: int = _REFINED) -> Placement:
-        """The best of all candidates, refined; or of a grid of so many points.
+        """The best of all candidates, refined; or of a grid of so many points; see ``search``."""
+        return finish(self.search(points, refined))
+
+    def search(self, points: int = 0, refined: int = _REFINED) -> Work[Placement]:
+        """``best``, in slices.
 
         Raises
         ------
         NoPlacement: so many robots do not fit beside each other anywhere, or none of the cheapest
             thousands of placements holds the task as it should.
         """
-        candidates = self.grid(points) if points else self.candidates()
+        candidates = self.grid(points) if points else (yield from self.candidates())
         if not len(candidates):
             raise NoPlacement(
                 f"{self.count} robots of {1e3 * self.radius:.0f} mm find no room round the object"
             )
-        costs = np.array([self.cost(way, _LOOSE) for way in candidates])
+        costs = np.empty(len(candidates))
+        for k, way in enumerate(candidates):
+            costs[k] = self.cost(way, _LOOSE)
+            if k % _SLICE == _SLICE - 1:
+                yield
         step = 0.5 * self.outline.length / (points or _GRID[self.count])
-        order = [
-            k for k in np.argsort(costs, kind="stable")[:_HELD_AGAINST] if self.holds(candidates[k])
-        ]
+        order = []
+        for tried, k in enumerate(np.argsort(costs, kind="stable")[:_HELD_AGAINST]):
+            if self.holds(candidates[k]):
+                order.append(k)
+            if tried % _SLICE == _SLICE - 1:
+                yield
         if not order:
             raise NoPlacement(
                 f"no placement of {self.count} robots holds the task with a margin of "
                 f"{self.settings.least_margin:g} and {self.settings.most_force:g} N a robot"
             )
-        found = [self.refine(candidates[k], step, _COARSE, _WORTH) for k in order[:refined]]
+        found = []
+        for k in order[:refined]:
+            found.append((yield from self.refine(candidates[k], step, _COARSE, _WORTH)))
         found.sort(key=lambda pair: pair[0])
-        last = [self.refine(way, _COARSE, _FINEST, _FINALLY) for _, way in found[:_LAST]]
+        last = []
+        for _, way in found[:_LAST]:
+            last.append((yield from self.refine(way, _COARSE, _FINEST, _FINALLY)))
         return self.placement(min(last, key=lambda pair: pair[0])[1])
 
     def refine(
         self, way: Array, step: float, finest: float = _FINEST, worth: float = _FINALLY
-    ) -> tuple[float, Array]:
-        """Cost and places that robots do not better by moving a little: a compass search.
+    ) -> Work[tuple[float, Array]]:
+        """Cost and places that robots do not better by moving a little: a compass search, in
+        slices.
 
         One at a time, all together, and all apart or together; by steps [m] until ``finest``, as
         long as they save the part ``worth`` of the cost.
@@ -287,6 +313,7 @@ class Placer:
                     cost, way, better = other, trial, True
             if not better:
                 step *= 0.5
+            yield
         return cost, np.mod(way, self.outline.length)
 
     def placement(self, way: Array) -> Placement:
@@ -322,8 +349,20 @@ def robust_placement(
     radius: float,
     most_force: float,
     settings: PlacementSettings | None = None,
-    free: Callable[[Array], Mask] | None = None,
 ) -> Placement:
+    """``robust_search`` at once."""
+    return finish(robust_search(item, trajectory, count, radius, most_force, settings))
+
+
+def robust_search(
+    item: ObjectSpec,
+    trajectory: ObjectTrajectory,
+    count: int,
+    radius: float,
+    most_force: float,
+    settings: PlacementSettings | None = None,
+    free: Callable[[Array], Mask] | None = None,
+) -> Work[Placement]:
     """The best placement for robots that correct errors as they push: with a margin of up
     to 0.1 as far as there is one, all of them pushing, and none with more than ``most_force`` [N].
 
@@ -331,25 +370,21 @@ def robust_placement(
     ------
     NoPlacement: none holds the task at all.
     """
-    settings = settings or PlacementSettings()
+    settings, candidates = settings or PlacementSettings(), None
     for least in _MARGINS:
         asked = replace(settings, least_margin=least, only_pushing=True, most_force=most_force)
+        placer = Placer(item, trajectory, count, radius, asked, free, candidates)
+        candidates = yield from placer.candidates()
         try:
-            return Placer(item, trajectory, count, radius, asked, free).best()
+            return (yield from placer.search())
         except NoPlacement:
             if least == _MARGINS[-1]:
                 raise
     raise AssertionError("unreachable")
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _cost_at(
-    way: Any, starts: Any, edges: Any, ways: Any, first: Any, last: Any, sine: float,
-    cosine: float, scale: Any, turn: Any, steps: Any, q: Any, r: float, size: float,
-    tolerance: float, contacts: Any, columns: Any, u: Any, z: Any, new: Any, work: Any,
-) -> float:  # fmt: skip
-    for i in range(way.shape[0]):
-        x, y, nx, ny = contact_at(way[i], starts, edges, ways, first, last)
-        contacts[i, 0], contacts[i, 1], contacts[i, 2], contacts[i, 3] = x, y, nx, ny
-    cone_columns(contacts, sine, cosine, scale, columns)
-    return float(tracking_cost(columns, turn, steps, q, r, size, tolerance, u, z, new, work))
+def _different(rows: Array) -> Array:
+    """Rows ``(k, 3)`` without those that are there already: a piece with one twist has one."""
+    _, first = np.unique(np.round(rows, 9), axis=0, return_index=True)
+    different: Array = rows[np.sort(first)]
+    return different

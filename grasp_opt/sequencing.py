@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from grasp_opt.slices import Work
 from push_model.arrays import Array, Mask
 from push_model.free_space import FreeSpace, Obstacles
 
@@ -70,10 +71,11 @@ class Sequencer:
             self._walls.outlines, np.vstack([self._walls.discs, np.reshape(discs, (-1, 3))])
         )
 
-    def assign(self, places: Array) -> tuple[int, ...]:
-        """Which robot takes each place: the least sum of ways round what stands still."""
+    def assign(self, places: Array) -> Work[tuple[int, ...]]:
+        """Which robot takes each place, in slices: those with the least sum of ways."""
         cost = np.full((len(self._alive), len(places)), 1e3)
         for k, robot in enumerate(self._alive):
+            yield
             reach = self._space.from_here(self._at[robot], self._need, self._walls)
             for j, place in enumerate(places):
                 way = reach.way_to(self._before(place, self._back))
@@ -88,8 +90,8 @@ class Sequencer:
         """``(2,)`` so far straight behind a place ``(3,)``."""
         return np.array(place[:2]) - back * np.array([math.cos(place[2]), math.sin(place[2])])
 
-    def clear(self, pushers: tuple[int, ...], outlines: list[Array], swept: Array) -> None:
-        """Send those who do not push out of the way of object and pushers, if they are in it.
+    def clear(self, pushers: tuple[int, ...], outlines: list[Array], swept: Array) -> Work[None]:
+        """Send robots that do not push out of the way of object and pushers, in slices.
 
         Raises
         ------
@@ -98,6 +100,7 @@ class Sequencer:
         for robot in self._alive:
             if robot in pushers:
                 continue
+            yield
             here = self._at[robot][None]
             if self._out_of_the_way(here, outlines, swept)[0]:
                 continue
@@ -128,8 +131,9 @@ class Sequencer:
         self._moves.append(move)
         self._at[move.robot] = move.points[-1]
 
-    def send(self, pushers: tuple[int, ...], places: Array) -> None:
-        """Ways to the places, one after the other; who stands in the way of all others goes aside.
+    def send(self, pushers: tuple[int, ...], places: Array) -> Work[None]:
+        """Ways to the places, one after the other, in slices. A robot that stands in the way of all
+        others goes aside first.
 
         Raises
         ------
@@ -138,7 +142,11 @@ class Sequencer:
         to_go = dict(zip(pushers, places, strict=True))
         asides = 2 * len(to_go)
         while to_go:
-            gone = [robot for robot, place in to_go.items() if self._try(robot, place)]
+            gone = []
+            for robot, place in to_go.items():
+                if self._try(robot, place):
+                    gone.append(robot)
+                yield
             for robot in gone:
                 del to_go[robot]
             if gone:

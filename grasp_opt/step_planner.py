@@ -9,21 +9,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from grasp_opt.contact_outline import ContactOutline
+from grasp_opt.detours import Detours, Holding, size
 from grasp_opt.object_trajectory import ObjectTrajectory, screw
 from grasp_opt.placement import (
     NoPlacement,
     Placement,
     PlacementSettings,
     Placer,
-    robust_placement,
+    robust_search,
 )
 from grasp_opt.sequencing import LEAST_BACK, Move, NoStep, Sequencer, standoffs
+from grasp_opt.slices import Work, finish
 from push_model import se2
 from push_model.arrays import Array, Mask
 from push_model.free_space import FreeSpace, Obstacles
 from push_model.object_way import NoObjectWay, WayFinder, pieces
 from push_model.occupancy import OccupancyGrid
-from push_model.screws import point_velocities, screw_between, screw_poses
+from push_model.screws import point_velocities, screw_poses
 from push_model.settings import bounded, settings
 from push_model.specs import ObjectSpec, RobotSpec
 from push_model.traction import lift_share, push_force, standing_traction
@@ -31,12 +33,6 @@ from push_model.traction import lift_share, push_force, standing_traction
 _MOST = 5  # robots that are placed at once
 _ROOMS = (1.0, 0.5, 0.1)  # of the room round the object, one after another
 _LOOKED_AT = 0.04  # [m] between poses of a piece at which places are looked at
-_TWISTS = 60  # that are tried for detours
-_LENGTHS = (0.15, 0.3, 0.6, 1.0)  # [m] of their first pieces
-_DETOURS = 5  # of which the shortest is taken
-_ESCAPES = 12  # motions that are tried when there is none
-_SURE = 0.05  # of margin with which a detour must be held
-_SEED = 1
 _PARTS = (1.0, 0.75, 0.5, 0.35, 0.25, 0.15, 0.08)  # of a trajectory that no placement holds whole
 
 
@@ -44,17 +40,51 @@ _PARTS = (1.0, 0.75, 0.5, 0.35, 0.25, 0.15, 0.08)  # of a trajectory that no pla
 class StepSettings:
     """Room, speeds, and how sure a placement must be."""
 
-    room: float = bounded(0.03, low=0.0, high=1.0, doc="[m] about the object beside a robot's size")
-    clearance: float = bounded(0.01, low=0.0, high=1.0, doc="[m] of robots from everything")
-    gap: float = bounded(0.015, low=0.0, high=1.0, doc="[m] between robots that push a piece")
-    standoff: float = bounded(0.012, low=1e-3, high=0.5, doc="[m] from a place to where it is met")
-    back: float = bounded(0.05, low=0.0, high=1.0, doc="[m] straight on at the end of a way there")
-    speed: float = bounded(0.05, low=1e-3, high=5.0, doc="[m/s] of the object's farthest point")
-    acceleration: float = bounded(0.05, low=1e-3, high=50.0, doc="[m/s^2] likewise")
-    force_share: float = bounded(0.85, low=0.1, high=1.0, doc="of its traction that a robot gives")
-    margin: float = bounded(0.1, low=0.0, high=1.0, doc="of the compatibility test that is enough")
-    steps: int = bounded(8, low=5, high=1000, doc="N of (3.16) for a piece, which is one wrench")
-    longest: float = bounded(1.5, low=0.05, high=100.0, doc="[m] of a piece; then all look again")
+    room: float = bounded(
+        0.03,
+        low=0.0,
+        high=1.0,
+        doc="free space wanted around the object in addition to a robot diameter (m)",
+    )
+    clearance: float = bounded(
+        0.01, low=0.0, high=1.0, doc="least clearance of robots on their paths (m)"
+    )
+    gap: float = bounded(
+        0.015, low=0.0, high=1.0, doc="least gap between robots that push together (m)"
+    )
+    standoff: float = bounded(
+        0.012,
+        low=1e-3,
+        high=0.5,
+        doc="distance from the object at which robots wait before contact (m)",
+    )
+    back: float = bounded(
+        0.05, low=0.0, high=1.0, doc="straight last part of the path to a place at the object (m)"
+    )
+    speed: float = bounded(
+        0.05, low=1e-3, high=5.0, doc="greatest speed of any point of the object (m/s)"
+    )
+    acceleration: float = bounded(
+        0.05, low=1e-3, high=50.0, doc="greatest acceleration of any point of the object (m/s^2)"
+    )
+    force_share: float = bounded(
+        0.85, low=0.1, high=1.0, doc="fraction of its traction that a robot may use"
+    )
+    margin: float = bounded(
+        0.1,
+        low=0.0,
+        high=1.0,
+        doc="margin of the compatibility test that makes more robots unnecessary, a sine",
+    )
+    steps: int = bounded(
+        8, low=5, high=1000, doc="number N of time steps of (3.16) for a piece with one twist"
+    )
+    longest: float = bounded(
+        1.5,
+        low=0.05,
+        high=100.0,
+        doc="longest piece of the way before the next step is planned (m)",
+    )
 
 
 class TooFew(NoStep):
@@ -77,8 +107,48 @@ class GroupPlan:
     left: int
 
 
+@dataclass(frozen=True)
+class Scene:
+    """Where everybody is when a step is planned.
+
+    pose ``(3,)``: of the object's centre of mass. robots ``(n, 3)``: all of them. dead: indices of
+    those that do not move. others ``(k, 3)``: x, y, radius [m] of further bodies. fewest: robots
+    that must push at least, as far as there are so many.
+    """
+
+    pose: Array
+    robots: Array
+    dead: tuple[int, ...]
+    others: Array
+    fewest: int = 0
+
+    @property
+    def alive(self) -> list[int]:
+        """Indices of robots that move."""
+        return [i for i in range(len(self.robots)) if i not in self.dead]
+
+    def still(self, radius: float) -> Array:
+        """``(k, 3)`` x, y, radius [m] of everything that stands in the way for ever; radius: of the
+        robots."""
+        standing = [[*self.robots[i, :2], radius] for i in self.dead]
+        return np.vstack([np.reshape(standing, (-1, 3)), np.reshape(self.others, (-1, 3))])
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """A push: its trajectory, poses ``(k, 3)`` on it at which room is looked at, and pieces of the
+    way, this one included."""
+
+    trajectory: ObjectTrajectory
+    poses: Array
+    left: int
+
+
 class StepPlanner:
-    """Plans for one object and robots of one type on one map."""
+    """Plans for one object and robots of one type on one map.
+
+    ``planning`` and ``planning_along`` do the work in slices; ``plan`` and ``along`` do it at once.
+    """
 
     def __init__(
         self,
@@ -101,8 +171,10 @@ class StepPlanner:
         finder = WayFinder(self._space, self._shape, room)
         self._finders = [finder.with_room(part * room) for part in _ROOMS]
         self._reach = float(np.hypot(*self._shape.T).max())
-        self._known: dict[int, list[Array]] = {}  # by the number of robots
-        self._fewest = 0  # of the plan under way
+        holding = Holding(
+            item, self._radius, self._reach, s.speed, s.acceleration, self.force, self._placement
+        )
+        self._detours = Detours(holding)
 
     @property
     def force(self) -> float:
@@ -119,42 +191,8 @@ class StepPlanner:
         others: Array,
         fewest: int = 0,
     ) -> GroupPlan:
-        """The next step towards a goal.
-
-        Parameters
-        ----------
-        pose, goal ``(3,)``: of the centre of mass. robots ``(n, 3)``: all of them; dead: indices of
-            those that stand for ever. others ``(k, 3)``: x, y, radius [m] of further bodies.
-            fewest: robots that push at least, as far as there are so many.
-
-        Raises
-        ------
-        NoStep
-        """
-        alive = [i for i in range(len(robots)) if i not in dead]
-        self._fewest = fewest
-        self._least(len(alive))
-        still = self._still(robots, dead, others)
-        why: Exception = NoStep("there is no way for the object")
-        for finder in self._finders:
-            # What stands beside the object is a little smaller: they may touch.
-            thin = np.column_stack([still[:, :2], np.maximum(0.0, still[:, 2] - 8e-3)])
-            try:
-                way = pieces(finder.way(pose, goal, Obstacles(discs=thin)))
-            except NoObjectWay as error:
-                why = NoStep(str(error))
-                continue
-            for motion in self._first(*way[0], finder, Obstacles(discs=thin)):
-                try:
-                    return self._step(pose, motion, robots, alive, still, len(way))
-                except NoStep as error:
-                    why = error
-            for motion in self._detours(*way[0], finder, Obstacles(discs=thin), len(alive)):
-                try:
-                    return self._step(pose, motion, robots, alive, still, len(way) + 1)
-                except NoStep as error:
-                    why = error
-        raise why
+        """``planning`` at once; arguments as of ``Scene``."""
+        return finish(self.planning(Scene(pose, robots, dead, others, fewest), goal))
 
     def along(
         self,
@@ -165,7 +203,46 @@ class StepPlanner:
         others: Array,
         fewest: int = 0,
     ) -> GroupPlan:
-        """Places and moves for a push along a trajectory that somebody gives; see ``plan``.
+        """``planning_along`` at once; arguments as of ``Scene``."""
+        return finish(self.planning_along(Scene(pose, robots, dead, others, fewest), trajectory))
+
+    def planning(self, scene: Scene, goal: Array) -> Work[GroupPlan]:
+        """The next step towards a goal ``(3,)`` of the centre of mass, in slices.
+
+        Raises
+        ------
+        NoStep
+        """
+        count = len(scene.alive)
+        self._least(count)
+        still = scene.still(self._radius)
+        # What stands beside the object is a little smaller: they may touch.
+        thin = np.column_stack([still[:, :2], np.maximum(0.0, still[:, 2] - 8e-3)])
+        among = Obstacles(discs=thin)
+        why: Exception = NoStep("there is no way for the object")
+        for finder in self._finders:
+            yield
+            try:
+                way = pieces(finder.way(scene.pose, goal, among))
+            except NoObjectWay as error:
+                why = NoStep(str(error))
+                continue
+            yield
+            for motion in self._first(*way[0], finder, among):
+                try:
+                    return (yield from self._step(scene, motion, len(way)))
+                except NoStep as error:
+                    why = error
+            detours = yield from self._detours.around(*way[0], finder, among, min(_MOST, count))
+            for motion in detours:
+                try:
+                    return (yield from self._step(scene, motion, len(way) + 1))
+                except NoStep as error:
+                    why = error
+        raise why
+
+    def planning_along(self, scene: Scene, trajectory: ObjectTrajectory) -> Work[GroupPlan]:
+        """Places and moves for a push along a trajectory that somebody gives, in slices.
 
         Where no placement holds all of it, it is of the first part that one holds: there the
         robots change places, and ``left`` is 2.
@@ -174,15 +251,12 @@ class StepPlanner:
         ------
         NoStep: also when the object does not keep clear of everything on it.
         """
-        alive = [i for i in range(len(robots)) if i not in dead]
-        self._fewest = fewest
-        self._least(len(alive))
-        still = self._still(robots, dead, others)
+        self._least(len(scene.alive))
         reach = self._reach + self._radius
         count = max(2, math.ceil((trajectory.length + _turned(trajectory) * reach) / _LOOKED_AT))
         times = np.linspace(0.0, trajectory.duration, count)
         poses = np.array([trajectory.sample(t) for t in times])
-        room = self._finders[0].clearance(poses, Obstacles(discs=still))
+        room = self._finders[0].clearance(poses, Obstacles(discs=scene.still(self._radius)))
         if room.min() < self.settings.clearance:
             k = int(np.argmin(room))
             raise NoStep(f"the object is too close to something {times[k]:.1f} s along its way")
@@ -190,10 +264,9 @@ class StepPlanner:
         for part in _PARTS:
             end = part * trajectory.duration
             task = trajectory if part == 1.0 else trajectory.between(0.0, end)
-            left = 1 if part == 1.0 else 2
-            way = poses[times <= end + 1e-9]
+            piece = _Piece(task, poses[times <= end + 1e-9], 1 if part == 1.0 else 2)
             try:
-                return self._push(pose, task, way, self._weights, robots, alive, still, left)
+                return (yield from self._push(scene, piece, self._weights))
             except NoStep as error:
                 why = error if part == 1.0 else why
         raise why
@@ -210,9 +283,9 @@ class StepPlanner:
         """
         placer = Placer(self._item, trajectory, len(way), self._radius, self._weights)
         ends = np.array([trajectory.pose[0], trajectory.pose[-1]])
-        nobody, everybody = np.zeros((0, 3)), list(range(len(robots)))
-        placed = placer.placement(way)
-        return self._with_moves(pose, placed, trajectory, ends, robots, everybody, nobody, 1)
+        scene = Scene(pose, robots, (), np.zeros((0, 3)))
+        piece = _Piece(trajectory, ends, 1)
+        return finish(self._with_moves(scene, piece, placer.placement(way)))
 
     def _least(self, alive: int) -> int:
         """How many robots have the force together; raises TooFew where so many alive have not."""
@@ -224,66 +297,11 @@ class StepPlanner:
             )
         return math.ceil(needed / self.force)
 
-    def _still(self, robots: Array, dead: tuple[int, ...], others: Array) -> Array:
-        """``(k, 3)`` discs that stand in the way for ever."""
-        standing = [[*robots[i, :2], self._radius] for i in dead]
-        return np.vstack([np.reshape(standing, (-1, 3)), np.reshape(others, (-1, 3))])
-
-    def _detours(
-        self, pose: Array, motion: Array, finder: WayFinder, among: Obstacles, alive: int
-    ) -> list[Array]:
-        """First motions for a piece that robots cannot hold: those that they can, after which they
-        can hold what is left, the shortest first; and then whatever leads nearer to its end."""
-        count = min(_MOST, alive)
-        end = screw_poses(pose, motion, np.ones(1))[0]
-        found: list[tuple[float, Array]] = []
-        escapes: list[tuple[float, Array]] = []
-        random = np.random.default_rng(_SEED)
-        twists = self._holdable(count)
-        ways = [length * twist for twist in twists for length in _LENGTHS]
-        for k in random.permutation(len(ways)):
-            first = ways[k]
-            if not finder.keeps(pose, first, among):
-                continue
-            there = screw_poses(pose, first, np.ones(1))[0]
-            rest = screw_between(there, end)
-            escapes.append((self._size(rest), first))
-            if finder.keeps(there, rest, among) and self._can_hold(rest, count):
-                found.append((self._size(first) + self._size(rest), first))
-                if len(found) == _DETOURS:
-                    break
-        tried = [
-            [first for _, first in sorted(some, key=lambda pair: pair[0])[:most]]
-            for some, most in ((found, _DETOURS), (escapes, _ESCAPES))
-        ]
-        return [*tried[0], *tried[1]]
-
-    def _size(self, motion: Array) -> float:
-        return float(np.hypot(*motion[:2]) + self._reach * abs(motion[2]))
-
-    def _holdable(self, count: int) -> list[Array]:
-        """Twists of unit size that so many robots can hold, of many in all directions."""
-        if count not in self._known:
-            random = np.random.default_rng(_SEED)
-            drawn = random.normal(size=(_TWISTS, 3)) / [1.0, 1.0, self._reach]
-            twists = [t / self._size(t) for t in drawn]
-            self._known[count] = [t for t in twists if self._can_hold(t, count)]
-        return self._known[count]
-
-    def _can_hold(self, motion: Array, count: int) -> bool:
-        """Whether so many robots hold a motion from somewhere, were there nothing else."""
-        s = self.settings
-        task = screw(np.zeros(3), motion, s.speed, s.acceleration, self._reach)
-        asked = replace(
-            self._placement, least_margin=_SURE, only_pushing=True, most_force=self.force
-        )
-        return Placer(self._item, task, count, self._radius, asked).exists()
-
     def _first(
         self, pose: Array, motion: Array, finder: WayFinder, among: Obstacles
     ) -> list[Array]:
         """The first piece, not too long; else only its translation, only its turn."""
-        length = self._size(motion)
+        length = size(motion, self._reach)
         motion = motion * min(1.0, self.settings.longest / length)
         end = se2.between(pose, screw_poses(pose, motion, np.ones(1))[0])
         turns = [np.array([0.0, 0.0, end[2]])] if abs(end[2]) > 0.05 else []
@@ -292,96 +310,82 @@ class StepPlanner:
         parts += [0.5 * motion] if length > 0.2 else []
         return [motion, *(p for p in parts if finder.keeps(pose, p, among))]
 
-    def _step(
-        self, pose: Array, motion: Array, robots: Array, alive: list[int], still: Array, left: int
-    ) -> GroupPlan:
-        s = self.settings
-        trajectory = screw(pose, motion, s.speed, s.acceleration, self._reach + self._radius)
-        looks = max(2, math.ceil(self._size(motion) / _LOOKED_AT) + 1)
-        poses = screw_poses(pose, motion, np.linspace(0.0, 1.0, looks))
-        return self._push(pose, trajectory, poses, self._placement, robots, alive, still, left)
+    def _step(self, scene: Scene, motion: Array, left: int) -> Work[GroupPlan]:
+        """A push by one motion ``(3,)``."""
+        s, reach = self.settings, self._reach + self._radius
+        trajectory = screw(scene.pose, motion, s.speed, s.acceleration, reach)
+        looks = max(2, math.ceil(size(motion, self._reach) / _LOOKED_AT) + 1)
+        poses = screw_poses(scene.pose, motion, np.linspace(0.0, 1.0, looks))
+        piece = _Piece(trajectory, poses, left)
+        return (yield from self._push(scene, piece, self._placement))
 
-    def _push(
-        self,
-        pose: Array,
-        trajectory: ObjectTrajectory,
-        poses: Array,
-        weights: PlacementSettings,
-        robots: Array,
-        alive: list[int],
-        still: Array,
-        left: int,
-    ) -> GroupPlan:
+    def _push(self, scene: Scene, piece: _Piece, weights: PlacementSettings) -> Work[GroupPlan]:
         """The fewest robots that hold a trajectory well enough, with their places and moves."""
-        s, twist = self.settings, trajectory.first_twist
-        walls = Obstacles(discs=still)
+        s, alive = self.settings, len(scene.alive)
 
         def free(way: Array) -> Mask:
-            contacts = self._outline.at(way)
-            centres = contacts.centres(self._radius)
-            ahead = point_velocities(twist, centres)
-            ahead /= np.maximum(1e-9, np.hypot(*ahead.T))[:, None]
-            off = standoffs(contacts.normals, ahead, s.standoff) + LEAST_BACK * s.back
-            met = se2.transform(pose, centres - off * ahead)
-            points = np.vstack([met, *(se2.transform(p, centres) for p in poses)])
-            room = self._space.room(points, walls).reshape(len(poses) + 1, -1)
-            enough: Mask = np.all(room >= self._radius + 0.5 * s.clearance, axis=0)
-            return enough
+            return self._free(scene, piece, way)
 
         why: Exception = NoStep("no robots")
-        most, least = min(_MOST, len(alive)), self._least(len(alive))
-        fewest = min(most, max(self._fewest, least))
+        most, least = min(_MOST, alive), self._least(alive)
+        fewest = min(most, max(scene.fewest, least))
         doubtful: list[Placement] = []
         for count in (*range(fewest, most + 1), *range(fewest - 1, least - 1, -1)):
             try:
-                placement = robust_placement(
-                    self._item, trajectory, count, self._radius, self.force, weights, free
+                placement = yield from robust_search(
+                    self._item, piece.trajectory, count, self._radius, self.force, weights, free
                 )
                 if placement.margin < s.margin - 1e-9:
                     doubtful.append(placement)
                     continue
-                return self._with_moves(
-                    pose, placement, trajectory, poses, robots, alive, still, left
-                )
+                return (yield from self._with_moves(scene, piece, placement))
             except NoPlacement as error:
                 why = NoStep(str(error))
             except NoStep as error:
                 why = error
         for placement in sorted(doubtful, key=lambda p: -p.margin):
             try:
-                return self._with_moves(
-                    pose, placement, trajectory, poses, robots, alive, still, left
-                )
+                return (yield from self._with_moves(scene, piece, placement))
             except NoStep as error:
                 why = error
         raise NoStep(str(why))
 
-    def _with_moves(
-        self,
-        pose: Array,
-        placement: Placement,
-        trajectory: ObjectTrajectory,
-        poses: Array,
-        robots: Array,
-        alive: list[int],
-        still: Array,
-        left: int,
-    ) -> GroupPlan:
-        s, centres = self.settings, placement.contacts.centres(self._radius)
-        ahead = point_velocities(trajectory.first_twist, centres)
+    def _free(self, scene: Scene, piece: _Piece, way: Array) -> Mask:
+        """Where along the outline, of ways ``(n,)`` [m], a robot has room all along a push, and on
+        the last part of its way to the place."""
+        s, contacts = self.settings, self._outline.at(way)
+        centres = contacts.centres(self._radius)
+        ahead = point_velocities(piece.trajectory.first_twist, centres)
+        ahead /= np.maximum(1e-9, np.hypot(*ahead.T))[:, None]
+        off = standoffs(contacts.normals, ahead, s.standoff) + LEAST_BACK * s.back
+        met = se2.transform(scene.pose, centres - off * ahead)
+        points = np.vstack([met, *(se2.transform(p, centres) for p in piece.poses)])
+        walls = Obstacles(discs=scene.still(self._radius))
+        room = self._space.room(points, walls).reshape(len(piece.poses) + 1, -1)
+        enough: Mask = np.all(room >= self._radius + 0.5 * s.clearance, axis=0)
+        return enough
+
+    def _with_moves(self, scene: Scene, piece: _Piece, placement: Placement) -> Work[GroupPlan]:
+        """The plan of a push from known places: who goes to which of them, and how."""
+        s, pose, centres = self.settings, scene.pose, placement.contacts.centres(self._radius)
+        ahead = point_velocities(piece.trajectory.first_twist, centres)
         ahead /= np.hypot(*ahead.T)[:, None]
         normals = placement.contacts.normals
         met = se2.transform(pose, centres - standoffs(normals, ahead, s.standoff) * ahead)
         headings = pose[2] + np.arctan2(ahead[:, 1], ahead[:, 0])
         places = np.column_stack([met, headings])
         outline = se2.transform(pose, self._shape)
-        walls = Obstacles((outline,), still)
-        sequencer = Sequencer(self._space, self._radius, s.clearance, s.back, walls, robots, alive)
-        pushers = sequencer.assign(places)
-        swept = np.vstack([se2.transform(p, centres) for p in poses])
-        sequencer.clear(pushers, [se2.transform(p, self._shape) for p in poses], swept)
-        sequencer.send(pushers, places)
-        return GroupPlan(pushers, placement, trajectory, sequencer.batches(), left)
+        walls = Obstacles((outline,), scene.still(self._radius))
+        sequencer = Sequencer(
+            self._space, self._radius, s.clearance, s.back, walls, scene.robots, scene.alive
+        )
+        pushers = yield from sequencer.assign(places)
+        swept = np.vstack([se2.transform(p, centres) for p in piece.poses])
+        outlines = [se2.transform(p, self._shape) for p in piece.poses]
+        yield from sequencer.clear(pushers, outlines, swept)
+        yield from sequencer.send(pushers, places)
+        batches = sequencer.batches()
+        return GroupPlan(pushers, placement, piece.trajectory, batches, piece.left)
 
 
 def _turned(trajectory: ObjectTrajectory) -> float:

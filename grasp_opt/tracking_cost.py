@@ -230,3 +230,18 @@ def cone_columns(contacts: Any, sine: float, cosine: float, scale: Any, columns:
             j = 2 * i + side
             columns[0, j], columns[1, j] = scale[0] * fx, scale[1] * fy
             columns[2, j] = scale[2] * (x * fy - y * fx)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def placement_cost(
+    way: Any, starts: Any, edges: Any, ways: Any, first: Any, last: Any, sine: float,
+    cosine: float, scale: Any, turn: Any, steps: Any, q: Any, r: float, size: float,
+    tolerance: float, contacts: Any, columns: Any, u: Any, z: Any, new: Any, work: Any,
+) -> float:  # fmt: skip
+    """``tracking_cost`` of places ``way (n,)`` [m] along an outline; contacts ``(n, 4)``, columns
+    ``(3, 2n)``: room to work."""
+    for i in range(way.shape[0]):
+        x, y, nx, ny = contact_at(way[i], starts, edges, ways, first, last)
+        contacts[i, 0], contacts[i, 1], contacts[i, 2], contacts[i, 3] = x, y, nx, ny
+    cone_columns(contacts, sine, cosine, scale, columns)
+    return float(tracking_cost(columns, turn, steps, q, r, size, tolerance, u, z, new, work))

@@ -14,13 +14,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from push_estimation.dead_reckoning import DeadReckoning
 from push_model import se2
 from push_model.arrays import Array
 from push_model.stable_push import shifted_limits
 from push_mpc.checks import EndCheck, FailureCheck
 from push_mpc.command import Command
 from push_mpc.controller import Contact, MpcResult, PredictiveController, Reference
-from push_mpc.dead_reckoning import DeadReckoning
 from push_mpc.grasp_estimate import GraspEstimate, distance
 from push_mpc.reference_clock import ReferenceClock
 from push_mpc.settings import TrackerSettings

@@ -61,6 +61,7 @@ class Uncertainty:
             motion_capture__latency=latency,
             motion_capture__latency_jitter=self.latency_jitter,
         ).settings("controller", tracker__pose_delay=known)
+        believed = believed.settings("group", control__pose_delay=known)
         drawn: Row = {} if low == high else {"latency_s": latency}
         objects = {}
         for name, (item, start) in believed.objects.items():

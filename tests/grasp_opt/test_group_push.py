@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from grasp_opt.contact_outline import ContactOutline
+from grasp_opt.group_control import PRINTED_LAW, GroupControlSettings
 from grasp_opt.group_push import ActuationMonitor, GroupPush, GroupPushSettings, Phase
 from grasp_opt.object_trajectory import polynomial
 from push_model.specs import EnvironmentSpec
@@ -94,3 +95,18 @@ def test_obedience_tells_who_does_not_turn():
         poses = np.array([[0.0, 0.0, 3.0 + 0.8 * t], [0.0, 0.0, 1.0]])
         answer = watch.step(t, poses, told)
     assert answer == (1,)
+
+
+@pytest.mark.parametrize(("name", "half"), [("plate_rectangle", 0.6), ("plate_hexagon", 0.4)])
+def test_the_printed_law_pushes_with_gains_of_its_own(name, half):
+    """(3.25) as printed. With the gains of the default law it hardly moves: its speed is the gain
+    times a robot's share of the floor's friction, 0.002 m/s/N times less than 1 N."""
+    item = load_object(name)
+    ways = ContactOutline(item.geometry).way_of_angle(1.5 * math.pi + np.array([-half, half]))
+    step, pose, _ = run(GroupPush(item, ROBOT, ways, BEND, None, PRINTED_LAW), item)
+    assert step.phase is Phase.DONE, step.reason
+    assert np.hypot(*(pose - BEND.pose[-1])[:2]) < 0.01
+    slow = GroupPush(item, ROBOT, ways, BEND, None, GroupControlSettings(law="printed"))
+    step, pose, _ = run(slow, item)
+    assert step.phase is Phase.FAILED
+    assert np.hypot(*(pose - BEND.pose[0])[:2]) < 0.15

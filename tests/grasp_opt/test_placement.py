@@ -9,6 +9,7 @@ from scipy.optimize import lsq_linear
 
 from grasp_opt.object_trajectory import polynomial, study_trajectories
 from grasp_opt.placement import NoPlacement, PlacementSettings, Placer, robust_placement
+from grasp_opt.placement_bound import PlacementBound
 from grasp_opt.placement_nlp import LocalPlacer
 from push_model.shape_specs import RectangleShape
 from push_scenario.bodies import load_object
@@ -143,3 +144,23 @@ def test_a_robust_placement_has_margin_pushes_only_and_asks_no_robot_for_too_muc
     assert free.cost <= robust.cost * (1 + 1e-6)
     with pytest.raises(NoPlacement, match=r"holds the task with a margin of 0 and 0\.5 N a robot"):
         robust_placement(item, task, 2, 0.05, 0.5, FEW)
+
+
+@pytest.mark.parametrize("name", list(plates()))
+@pytest.mark.parametrize("count", [2, 3])
+def test_no_placement_costs_less_than_the_lower_bound(name, count):
+    """Random placements and the best known one, by an exact solver; boxes large and small."""
+    placer = Placer(plates()[name], SIX["sinusoid-3"], count, 0.05, FEW)
+    best, judge, random = placer.best(), PlacementBound(placer), np.random.default_rng(5)
+    grid = placer.grid({2: 60, 3: 24}[count])
+    some = [best.way, *grid[random.integers(len(grid), size=4)]]
+    lowers = [judge.lower(0.01, best.cost, boxes).lower for boxes in (0, 600)]
+    assert 0.0 <= lowers[0] <= min(exact(placer, way) for way in some) * (1 + 1e-6)
+    assert lowers[0] <= lowers[1] + 1e-12 <= best.cost * (1 + 1e-6)
+
+
+def test_the_best_known_placement_of_two_is_near_the_lower_bound():
+    placer = Placer(plates()["ellipse"], SIX["polynomial-2"], 2, 0.05, FEW)
+    best = placer.best()
+    bound = PlacementBound(placer).lower(0.1, best.cost, 6000)
+    assert 0.0 <= bound.gap(best.cost) <= 0.1

@@ -8,6 +8,7 @@ import pytest
 from grasp_opt.moves import Mover, MoveSettings, back_off
 from grasp_opt.object_trajectory import screw
 from grasp_opt.sequencing import NoStep, Sequencer
+from grasp_opt.slices import finish
 from grasp_opt.step_planner import StepPlanner, StepSettings, TooFew
 from push_model import se2
 from push_model.free_space import FreeSpace, Obstacles
@@ -144,8 +145,8 @@ def test_who_stands_in_the_way_and_cannot_leave_is_not_run_over():
         sequencer = Sequencer(space, RADIUS, 0.01, 0.05, Obstacles(), np.zeros((1, 3)), [0])
         moved = [outline + [0.0, middle]]
         if passes:
-            sequencer.clear((), moved, np.array([[1.0, 1.0]]))
+            finish(sequencer.clear((), moved, np.array([[1.0, 1.0]])))
             assert sequencer.batches() == ()
         else:
             with pytest.raises(NoStep, match="stands in the way and cannot leave"):
-                sequencer.clear((), moved, np.array([[1.0, 1.0]]))
+                finish(sequencer.clear((), moved, np.array([[1.0, 1.0]])))

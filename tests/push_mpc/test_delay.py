@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from push_estimation.dead_reckoning import DeadReckoning
 from push_model import CurvatureLimits, DifferentialDrive, se2, unicycle_step
 from push_model.trajectory import along_curve
 from push_mpc import LtvMpc, MpcSettings, Push, Task, TrackError, TrackerSettings, TrajectoryTracker
-from push_mpc.dead_reckoning import DeadReckoning
 
 DRIVE = DifferentialDrive(0.0205, 0.0265, 6.28)
 GRASP = np.array([0.095, 0.0, 0.0])

@@ -93,7 +93,7 @@ def test_a_group_pushes_on_with_the_friction_that_it_is_told():
         job = run.supervisor.method.job
         before = job.last.command
         tell(run, {("plate", "contact_friction"): (0.05, 0.04, 0.06)})
-        controller = job._push.controller
+        controller = job._step.push.controller
         assert controller.friction == 0.05 and run.planner._item.contact_friction == 0.05
         after = job.last.command
         inward = (after.forces * after.contacts.normals).sum(axis=1)
@@ -102,11 +102,11 @@ def test_a_group_pushes_on_with_the_friction_that_it_is_told():
         assert (along <= 0.05 * inward + 1e-9).all(), "forces lie in the narrower cones"
         assert before.lacking <= after.lacking + 1e-9
         tell(run, {("plate", "floor_friction"): (1.2, 1.0, 1.4)})
-        heavy = job._push.controller.surface.max_force
+        heavy = job._step.push.controller.surface.max_force
         spec = scenario.objects["plate"][0]
         assert heavy == pytest.approx(1.2 / spec.floor_friction * spec.limit_surface().max_force)
         assert controller.friction == 0.05, "what it said of contact is replaced"
-        assert job._push.controller.friction == spec.contact_friction
+        assert job._step.push.controller.friction == spec.contact_friction
 
 
 def test_a_swarm_makes_its_law_anew_for_what_it_is_told():
