@@ -87,11 +87,9 @@ class Arrival:
     def see(self, now: float, pose: Array) -> None:
         """Take a measured pose ``(3,)`` at a time [s]."""
         seen = self._seen
-        if seen and np.hypot(*(pose - seen[-1][1])[:2]) > _JUMP:
-            seen.clear()
-        if seen and now <= seen[-1][0]:  # the same frame once more, or a clock that was set back
-            if now == seen[-1][0]:
-                return
+        if seen and now == seen[-1][0]:  # the same frame once more
+            return
+        if seen and (now < seen[-1][0] or np.hypot(*(pose - seen[-1][1])[:2]) > _JUMP):
             seen.clear()
         heading = float(pose[2]) if not seen else float(seen[-1][1][2])
         seen.append((now, np.array([*pose[:2], heading + se2.wrap(float(pose[2]) - heading)])))

@@ -28,6 +28,7 @@ _LATTICE = 0.05  # [m] of places that robots can go to
 _SPARE = 0.01  # [m] that ways of robots keep from walls
 _NEAR = 0.2  # [m] from a robot within which it joins the lattice
 _PACE = 0.7  # mean speed of a push over the robots' greatest speed, as measured
+_AMPLE = 1.7  # force at best over what is needed above which swarms moved objects, as measured
 _GATHER = 1.5  # ways of robots round each other and the object over straight ones, likewise
 
 
@@ -60,6 +61,24 @@ class Assessment:
     def margin(self) -> float:
         """[N] of force that the robots have to spare at best; negative: that they lack."""
         return self.available - self.force
+
+
+@dataclass(frozen=True)
+class Strength:
+    """force: [N] that a motion takes; available: [N] that the robots can make of it at best;
+    too_heavy: why they cannot, None where they may."""
+
+    force: float
+    available: float
+    too_heavy: str | None
+
+    @property
+    def thin(self) -> bool:
+        """Whether robots that are not placed as well as can be may fail to move the object."""
+        return self.available < _AMPLE * self.force
+
+    def __str__(self) -> str:
+        return _forces(self.force, self.available)
 
 
 class Feasibility:
@@ -102,15 +121,16 @@ class Feasibility:
         seconds = self._gathering(pose, able) + way / (_PACE * self._speed)
         return Assessment(code, reason, len(able), needed, force, available, way, seconds)
 
-    def too_heavy(self, pose: Array, target: Array, robots: int) -> str | None:
-        """Why so many robots cannot move an object at a pose ``(3,)`` on straight towards a target
-        ``(3,)``, whatever they do; None where that is not shown."""
+    def strength(self, pose: Array, target: Array, robots: int) -> Strength:
+        """Of so many robots that move an object at a pose ``(3,)`` on straight towards a target
+        ``(3,)``."""
         twists = self._twists(pose, target)[:1]
         force = max((self.capacity.needed_force(t) for t in twists), default=0.0)
         available = self._available(twists, robots)
         if available >= force:
-            return None
-        return self._heavy(twists, force, available, least_contacts(target), robots)
+            return Strength(force, available, None)
+        text = self._heavy(twists, force, available, least_contacts(target))
+        return Strength(force, available, text)
 
     def _needed(self, twists: list[Array], least: int) -> int | None:
         """The fewest robots that may do for all of some twists ``(3,)`` in the object's frame; None
@@ -135,19 +155,16 @@ class Feasibility:
             text = f"none of {seen} robots can get to the object" if seen else "no robot is seen"
             return JobError.POSITIONING_FAILED, text
         if available < force:
-            return JobError.TOO_HEAVY, self._heavy(twists, force, available, least, able)
+            return JobError.TOO_HEAVY, self._heavy(twists, force, available, least)
         return (JobError.POSITIONING_FAILED, too_few(able, least)) if able < least else None
 
-    def _heavy(
-        self, twists: list[Array], force: float, available: float, least: int, robots: int
-    ) -> str:
+    def _heavy(self, twists: list[Array], force: float, available: float, least: int) -> str:
         """The refusal, with its numbers."""
-        down = math.floor(100.0 * available) / 100.0  # never as much as is needed
-        text = f"too heavy: needs {force:.2f} N, {counted(robots)} can make {down:.2f} N at best"
+        text = f"too heavy: {_forces(force, available)}"
         needed = self._needed(twists, least)
         if needed is None:
-            return f"{text}, and no more find room where it is pushed from"
-        return f"{text}; {needed} or more are needed"
+            return f"{text}, and no more robots find room where it is pushed from"
+        return f"{text}; at least {counted(needed)} are needed"
 
     def _available(self, twists: list[Array], robots: int) -> float:
         """[N] for the twist for which least is available of what it takes."""
@@ -222,6 +239,11 @@ def least_contacts(target: Array) -> int:
     """How many robots a target ``(3,)`` takes whatever the object weighs. What is left to do at a
     pose is a turn on the spot, which takes a couple: two forces. A position takes one."""
     return 1 if math.isnan(target[2]) else 2
+
+
+def _forces(force: float, available: float) -> str:
+    """As a traction check of one robot says it; never as much as is needed by rounding."""
+    return f"needs {force:.2f} N, has {math.floor(100.0 * available) / 100.0:.2f} N at best"
 
 
 def too_few(robots: int, least: int) -> str:

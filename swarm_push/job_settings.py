@@ -18,11 +18,12 @@ class SwarmJobSettings(ArrivalSettings, LivenessSettings):
         high=3600.0,
         doc="Time without the object coming closer to its target after which the job fails (s)",
     )
-    too_few: float = bounded(
-        15.0,
+    doubtful: float = bounded(
+        30.0,
         low=1.0,
         high=3600.0,
-        doc="The same time when fewer robots are left than keep an object on its course (s)",
+        doc="The same time when the robots are only just enough: their traction is little more "
+        "than the motion needs, or one robot is left to turn an object (s)",
     )
     alone: float = bounded(
         10.0,

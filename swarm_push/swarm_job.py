@@ -18,7 +18,7 @@ from push_model.occupancy import OccupancyGrid
 from push_model.specs import ObjectSpec, RobotSpec
 from swarm_push.arrival import Arrival, pose_errors
 from swarm_push.contacts import find_contacts
-from swarm_push.feasibility import Assessment, Feasibility, least_contacts, too_few
+from swarm_push.feasibility import Assessment, Feasibility, Strength, least_contacts, too_few
 from swarm_push.job_settings import SwarmJobSettings
 from swarm_push.law import Scene, SwarmPhase, SwarmStep
 from swarm_push.laws import LawSections, make_law
@@ -88,7 +88,7 @@ class SwarmJob:
         self._liveness = LivenessCheck(self.settings, wheels=not self.holonomic)
         self._arrival = Arrival(self.settings)
         self._feasibility = Feasibility(item, robot, grid, self.track)
-        self._heavy: dict[int, str | None] = {}  # for how many robots the object is, and why
+        self._strengths: dict[int, Strength] = {}  # of so many robots, for the present target
 
     def warm_up(self) -> None:
         """Load what is compiled, so that the first command does not wait."""
@@ -148,7 +148,7 @@ class SwarmJob:
         """The target that is pursued was moved."""
         self._queue.replace_current(target)
         self._arrival.restart()
-        self._heavy.clear()
+        self._strengths.clear()
         self._progress.forget()
         if self.track is not None:
             self.track.clear()
@@ -156,7 +156,7 @@ class SwarmJob:
     def _new_way(self) -> None:
         self._law.reset()
         self._way = _PlannedWay()
-        self._heavy.clear()
+        self._strengths.clear()
         self._arrival.restart()
         if self.track is not None:
             self.track.clear()
@@ -290,12 +290,12 @@ class SwarmJob:
         """Whether the job has ended for want of robots or progress. whole: whether robots are all
         that there are."""
         s, alive = self.settings, sum(n not in self._liveness.dead for n in robots)
-        too_heavy = self._too_heavy(pose, alive) if whole and alive else None
-        if alive and too_heavy is None:
+        strength = self._strength(pose, alive) if whole and alive else None
+        if alive and (strength is None or strength.too_heavy is None):
             self._progress.able = now
         elif now - self._progress.able > s.alone:
-            if too_heavy is not None:
-                self.end(JobError.TOO_HEAVY, too_heavy)
+            if strength is not None and strength.too_heavy is not None:
+                self.end(JobError.TOO_HEAVY, strength.too_heavy)
             else:
                 text = "no robot does as it is told" if robots else "there is no robot"
                 self.end(JobError.POSITIONING_FAILED, text)
@@ -305,25 +305,28 @@ class SwarmJob:
         if self.track is not None and self.track.under_way:
             left = self.track.left(pose)
         self._progress.look(now, left)
-        target = self._queue.current
-        least = 1 if target is None else least_contacts(target)
-        few = whole and alive < least
-        stalled = min(s.stalled, s.too_few) if few else s.stalled
+        doubt = self._doubt(alive, strength) if whole else ""
+        stalled = min(s.stalled, s.doubtful) if doubt else s.stalled
         if now - self._progress.closer > stalled:
             text = f"the object has come no closer than {1e3 * away:.0f} mm and {turned:.2f} rad"
-            text = f"{text} for {stalled:g} s"
-            text = f"{text}; {too_few(alive, least)}" if few else text
-            self.end(JobError.EXECUTION_FAILED, text)
+            self.end(JobError.EXECUTION_FAILED, f"{text} for {stalled:g} s{doubt}")
             return True
         return False
 
-    def _too_heavy(self, pose: Array, robots: int) -> str | None:
-        """Why so many robots cannot move the object, if so: looked at once for each number."""
+    def _doubt(self, robots: int, strength: Strength | None) -> str:
+        """What speaks against success with so many robots, if anything does."""
+        target = self._queue.current
+        if target is not None and robots < (least := least_contacts(target)):
+            return f"; {too_few(robots, least)}"
+        return f"; it {strength}" if strength is not None and strength.thin else ""
+
+    def _strength(self, pose: Array, robots: int) -> Strength:
+        """Of so many robots, looked at once for each number."""
         target = self._queue.current
         assert target is not None
-        if robots not in self._heavy:
-            self._heavy[robots] = self._feasibility.too_heavy(pose, target, robots)
-        return self._heavy[robots]
+        if robots not in self._strengths:
+            self._strengths[robots] = self._feasibility.strength(pose, target, robots)
+        return self._strengths[robots]
 
 
 def _limited(velocities: Array, speed: float) -> Array:
