@@ -28,7 +28,7 @@ _LATTICE = 0.05  # [m] of places that robots can go to
 _SPARE = 0.01  # [m] that ways of robots keep from walls
 _NEAR = 0.2  # [m] from a robot within which it joins the lattice
 _PACE = 0.7  # mean speed of a push over the robots' greatest speed, as measured
-_AMPLE = 1.7  # force at best over what is needed above which swarms moved objects, as measured
+_AMPLE = 1.8  # force at best over what is needed above which swarms moved objects, as measured
 _GATHER = 1.5  # ways of robots round each other and the object over straight ones, likewise
 
 

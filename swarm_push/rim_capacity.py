@@ -22,7 +22,7 @@ from push_model.arrays import Array
 from push_model.coulomb import cone_edges
 from push_model.grasp import grasp_matrix
 from push_model.specs import ObjectSpec, RobotSpec
-from push_model.traction import lift_share, standing_traction
+from push_model.traction import traction
 from swarm_push.rim import Rim
 
 _PARTS = 4  # places of the rim within a robot's diameter
@@ -30,13 +30,17 @@ _EXACT = 1e-6  # of a wrench
 
 
 class RimCapacity:
-    """Of round robots of one type at one object. traction: [N] with which one robot can push."""
+    """Of round robots of one type at one object.
+
+    traction: [N] with which one robot can push at most. That it leans back as it pushes takes some
+    of the load off its wheels (``push_model.traction``); as much as that is not certain, it is left
+    out, and so is the load that friction at the bumper puts on the object.
+    """
 
     def __init__(self, item: ObjectSpec, robot: RobotSpec) -> None:
-        radius, lift = robot.footprint_radius, lift_share(robot, item)
-        self.traction = standing_traction(robot, lift)
+        radius = robot.footprint_radius
+        self.traction = traction(robot, 0.0)
         self._surface = item.limit_surface()
-        self._pressed = 1.0 / (1.0 - item.floor_friction * lift)  # see push_model.traction
         rim = Rim(item.geometry.outline, radius, 2.0 * radius / _PARTS)
         count = len(rim.points)
         edges = np.array([cone_edges(n, item.contact_friction) for n in rim.normals])
@@ -97,7 +101,7 @@ class RimCapacity:
         return high
 
     def _wrench(self, twist: Array) -> Array:
-        wrench: Array = self._pressed * self._surface.wrench(twist) / self._scale
+        wrench: Array = self._surface.wrench(twist) / self._scale
         return wrench
 
     def _steepest(self) -> float:

@@ -51,7 +51,7 @@ def test_a_motion_takes_the_floor_friction_and_each_robot_adds_its_traction():
     """Without friction at the contacts robots side by side push straight ahead with F each."""
     capacity = RimCapacity(smooth(SQUARE), ROBOT)
     assert capacity.needed_force(AHEAD) == pytest.approx(0.3 * 0.327 * GRAVITY, rel=1e-3)
-    assert 1.5 < capacity.traction < 0.2 * GRAVITY  # less than its weight, for it leans back
+    assert capacity.traction == pytest.approx(0.2 * GRAVITY)  # its weight; wheel friction is 1
     made = [capacity.available_force(AHEAD, n) / capacity.traction for n in (0, 1, 2, 4, 50)]
     assert made[:4] == pytest.approx([0.0, 1.0, 2.0, 4.0], rel=0.01)
     assert made[4] == pytest.approx(4.0, rel=0.02)  # a side of 0.368 m has no room for a fifth
@@ -123,10 +123,10 @@ def test_no_placement_makes_more_than_what_is_said_to_be_available(name):
 
 
 def test_an_object_is_too_heavy_for_some_and_not_for_more():
-    job = job_in(room(), replace(SQUARE, mass=2.0))  # 5.9 N
+    job = job_in(room(), replace(SQUARE, mass=2.2))  # 6.5 N
     few, many = (job.assess(OPEN, np.zeros(3), team(n)) for n in (3, 5))
     assert few.code is JobError.TOO_HEAVY and few.needed == 4
-    assert few.force == pytest.approx(2.0 * 0.3 * GRAVITY, rel=0.02)
+    assert few.force == pytest.approx(2.2 * 0.3 * GRAVITY, rel=0.02)
     assert few.margin == pytest.approx(few.available - few.force) and few.margin < 0.0
     assert f"needs {few.force:.2f} N" in few.reason and "at least 4 robots" in few.reason
     assert many.accepted and many.margin > 0.0 and many.reason == ""
@@ -177,7 +177,7 @@ def test_a_job_that_is_under_way_is_not_touched_by_a_question():
 
 
 def test_a_job_is_given_up_soon_when_too_few_robots_are_left():
-    """Two of five stay in sight, who have 3.3 N for 4.4 N; they may be hidden for a second."""
+    """Two of five stay in sight, who have 3.9 N for 4.4 N; they may be hidden for a second."""
     job = job_in(room(), replace(SQUARE, mass=1.5))
     job.begin([OPEN])
     time = 0.0

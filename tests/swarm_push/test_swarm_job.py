@@ -171,18 +171,31 @@ def push_heavy(mass, **changes):
 
 
 def test_an_object_that_its_robots_cannot_move_is_given_up_soon_and_no_robot_is_blamed():
-    """5.3 N are needed, three robots have 4.96 N."""
-    job, time, moved = push_heavy(1.8)
+    """6.5 N are needed, three robots have 5.9 N."""
+    job, time, moved = push_heavy(2.2)
     assert job.error is JobError.TOO_HEAVY and "at least 4 robots" in job.reason
     assert time == pytest.approx(SwarmJobSettings().alone, abs=0.1) and moved < 5e-3
     assert not job.dead
 
 
-def test_an_object_that_its_robots_can_hardly_move_is_given_up_before_long():
-    """4.4 N are needed: what three robots make at best, which they do not reach."""
-    job, time, moved = push_heavy(1.5, doubtful=12.0)
-    assert job.error is JobError.EXECUTION_FAILED and "needs 4.41 N, has 4.9" in job.reason
-    assert time < 25.0 and moved < 0.1 and not job.dead
+def test_an_object_that_its_robots_can_just_move_is_not_refused():
+    """5.3 N are needed."""
+    job, _, moved = push_heavy(1.8)
+    assert job.error is JobError.NONE and moved > 0.9
+
+
+def test_robots_that_are_just_enough_are_given_less_time_without_progress():
+    """5.6 N are needed, three robots have 5.9 N at best; nothing moves."""
+    heavy = replace(load_object("swarm_square"), mass=1.9)
+    job = SwarmJob(REGION, heavy, ROBOT, SwarmJobSettings(doubtful=5.0), LawSections())
+    job.begin([np.array([1.0, 0.0, math.nan])])
+    still, time = {f"e{k}": np.array([-0.24, 0.12 * (k - 1), 0.0]) for k in range(3)}, 0.0
+    while job.busy and time < 20.0:
+        job.revive()  # robots that do not move are no matter here
+        job.step(time, np.zeros(3), still, NONE)
+        time += 0.02
+    assert job.error is JobError.EXECUTION_FAILED and "needs 5.59 N, has 5.9" in job.reason
+    assert time == pytest.approx(5.0, abs=0.1)
 
 
 def test_robots_that_come_and_leave_take_part_as_long_as_they_are_there():
