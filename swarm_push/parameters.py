@@ -1,4 +1,4 @@
-"""The parameters of a swarm: the same for its one node and for the nodes of single robots."""
+"""The settings of a swarm, of its one node and of its robots' own alike."""
 
 from dataclasses import dataclass
 from typing import TypeVar
@@ -24,7 +24,7 @@ _SECTIONS = ("law", "crescent", "thesis", "track", "agents", "poses")
 
 @dataclass(frozen=True)
 class SwarmParameters:
-    """All settings, and the job that they make."""
+    """All of them, and what they make."""
 
     job: SwarmJobSettings
     laws: LawSections
@@ -33,7 +33,7 @@ class SwarmParameters:
     poses: PoseGateSettings
 
     def make_job(self, grid: OccupancyGrid, item: ObjectSpec, robot: RobotSpec) -> SwarmJob | str:
-        """The job on a map; the reason as text where no job is possible on it."""
+        """For a map; where there can be none, why not."""
         region = covered_region(grid, robot.footprint_radius)
         if region is None:
             return "the map has no room for a robot"
