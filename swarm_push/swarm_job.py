@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -71,13 +72,21 @@ class SwarmJob:
         self.holonomic = isinstance(robot.drive, HolonomicDrive)
         self._drive = None if self.holonomic else robot.differential
         self._speed, self._radius = robot.max_speed, robot.footprint_radius
-        walls, self._walls, self.track = None, None, None
+        walls, self._walls, self.track, self._grid = None, None, None, grid
         if grid is not None:
             walls = Walls(grid, self._radius)
             self._walls = None if walls.open else walls
             track = track or TrackSettings()
             self.track = ObjectTrack(grid, item.geometry.outline, self._radius, track)
-        self._law = make_law(laws or LawSections(), region, item, self._radius, self._speed, walls)
+        self._make_law = partial(
+            make_law,
+            laws or LawSections(),
+            region,
+            radius=self._radius,
+            speed=self._speed,
+            walls=walls,
+        )
+        self._law = self._make_law(item)
         self._outline = item.geometry.outline
         self._lever = float(np.hypot(*self._outline.T).max())
         self.state, self.reason, self.error = JobPhase.IDLE, "waiting for a goal", JobError.NONE
@@ -87,6 +96,7 @@ class SwarmJob:
         self._way = _PlannedWay()
         self._liveness = LivenessCheck(self.settings, wheels=not self.holonomic)
         self._arrival = Arrival(self.settings)
+        self._robot = robot
         self._feasibility = Feasibility(item, robot, grid, self.track)
         self._strengths: dict[int, Strength] = {}  # of so many robots, for the present target
 
@@ -170,6 +180,19 @@ class SwarmJob:
     def revive(self) -> None:
         """Believe in all robots again: a new job, a reset world, or somebody saw to them."""
         self._liveness.revive()
+
+    def believe(self, item: ObjectSpec) -> None:
+        """Go on with another object than before: the law and what its robots can push are made anew
+        for it, and the way where its outline is another one."""
+        outline = item.geometry.outline
+        if not np.array_equal(outline, self._outline):
+            self._outline = outline
+            self._lever = float(np.hypot(*outline.T).max())
+            if self._grid is not None and self.track is not None:
+                self.track = ObjectTrack(self._grid, outline, self._radius, self.track.settings)
+        self._law = self._make_law(item)
+        self._feasibility = Feasibility(item, self._robot, self._grid, self.track)
+        self._strengths.clear()
 
     def errors(self, pose: Array) -> tuple[float, float]:
         """[m], [rad] from the target that is pursued; no heading counts as none off."""

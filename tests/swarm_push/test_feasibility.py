@@ -190,6 +190,13 @@ def test_a_job_is_given_up_soon_when_too_few_robots_are_left():
     assert time - 6.0 == pytest.approx(SwarmJobSettings().alone, abs=0.2)
 
 
+def test_a_heavier_object_is_believed_at_once():
+    job = job_in(room())
+    assert job.assess(OPEN, np.zeros(3), team(3)).accepted
+    job.believe(replace(SQUARE, mass=2.2))
+    assert job.assess(OPEN, np.zeros(3), team(3)).code is JobError.TOO_HEAVY
+
+
 def test_times_are_rough_and_longer_for_more_way():
     feasibility = Feasibility(SQUARE, ROBOT)
     near, far = (
