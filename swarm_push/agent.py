@@ -1,10 +1,11 @@
-"""One robot of a swarm that decides for itself: no ROS, no clock.
+"""One robot of a decentralised swarm. No ROS, no clock.
 
-It knows where it is itself, where the object is, and what neighbours within a radius say, where
-messages may be lost. It runs the same job and law as a whole swarm's node does, about those that it
-knows of, and does what that says for itself. Where a law takes the mean of all robots, that comes
-by consensus: flow updating (Jesus, Baquero and Almeida 2009), which messages that are lost do not
-bias: neighbours keep count of what each has handed to the other, and every message has all of it.
+The robot measures its own pose and the object's. It receives the states of neighbours within a
+radius; messages may be lost. It runs the same job and law as the node of a centralised swarm, on
+the robots that it knows of, and carries out its own command alone. A law that needs the mean of all
+robots gets an estimate by average consensus: flow updating (Jesus, Baquero and Almeida 2009). Lost
+messages do not bias it, because neighbours keep account of the flow between them and every message
+carries all of it.
 """
 
 from collections.abc import Mapping
@@ -20,20 +21,44 @@ from swarm_push.swarm_job import SwarmJob
 
 @settings
 class AgentSettings:
-    """What robots that decide for themselves know of each other."""
+    """Communication of a decentralised swarm."""
 
-    decentralised: bool = bounded(False, doc="one node a robot instead of one for all")
-    radius: float = bounded(0.8, low=0.05, high=100.0, doc="[m] from which neighbours are heard")
-    lost: float = bounded(0.0, low=0.0, high=0.99, doc="part of messages that get lost, on purpose")
-    seed: int = bounded(0, low=0, high=2**31 - 1, doc="of which ones")
-    forget: float = bounded(0.5, low=0.02, high=60.0, doc="[s] until a silent one is forgotten")
-    silence: float = bounded(1.0, low=0.05, high=60.0, doc="[s] without targets: robots stand")
+    decentralised: bool = bounded(
+        False, doc="Whether each robot has a node of its own; if false, one node moves all robots"
+    )
+    radius: float = bounded(
+        0.8,
+        low=0.05,
+        high=100.0,
+        doc="Communication radius: messages of robots farther away are ignored (m)",
+    )
+    lost: float = bounded(
+        0.0,
+        low=0.0,
+        high=0.99,
+        doc="Fraction of messages that is dropped on purpose, at random (dimensionless)",
+    )
+    seed: int = bounded(
+        0, low=0, high=2**31 - 1, doc="Seed of the random numbers that decide which are dropped"
+    )
+    forget: float = bounded(
+        0.5,
+        low=0.02,
+        high=60.0,
+        doc="Time without a message after which a neighbour is forgotten (s)",
+    )
+    silence: float = bounded(
+        1.0,
+        low=0.05,
+        high=60.0,
+        doc="Time without a message with the target after which the robot stops (s)",
+    )
 
 
 @dataclass(frozen=True)
 class AgentState:
-    """What a robot says at a time [s]: its pose ``(3,)``, what it takes for the mean ``(2,)`` [m]
-    of all, and what ``(2,)`` [m] of it it has handed to each that it hears."""
+    """What a robot broadcasts at a time [s]: its pose ``(3,)``, its estimate of the mean ``(2,)``
+    [m] of all robots, and the flow ``(2,)`` [m] of it to each neighbour."""
 
     name: str
     time: float
@@ -43,8 +68,9 @@ class AgentState:
 
 
 class Agent:
-    """One robot. job: of the swarm that it knows of; target ``(3,)`` that it has, if any; mean
-    ``(2,)`` [m] of all, as it takes it."""
+    """One robot. job: of the robots that it knows of; target: ``(3,)``, or None; mean: ``(2,)``
+    [m],
+    its estimate of the mean position of all robots."""
 
     def __init__(self, name: str, job: SwarmJob, settings: AgentSettings) -> None:
         self.name, self.job, self.settings = name, job, settings
@@ -58,11 +84,12 @@ class Agent:
 
     @property
     def neighbours(self) -> tuple[str, ...]:
-        """Whom it heard lately."""
+        """Names of the robots that it received a message of lately."""
         return tuple(self._heard)
 
     def pursue(self, target: Array | None) -> None:
-        """A target ``(3,)``, or none. Told so at every tick, for the object may have left it."""
+        """Take a target ``(3,)``, or none; called at every tick, because the object may have left
+        it."""
         before, self.target = self.target, target
         if target is None:
             self.job.end(JobError.NONE, "no target")
@@ -72,7 +99,7 @@ class Agent:
             self.job.retarget(target)
 
     def hear(self, message: AgentState) -> None:
-        """Take what a robot says; from farther off than the radius nothing is heard."""
+        """Take the message of a robot; that of one beyond the radius is ignored."""
         if message.name == self.name or self._random.random() < self.settings.lost:
             return
         here = self._before
@@ -86,7 +113,8 @@ class Agent:
     def step(
         self, now: float, item: Array, pose: Array, others: Array
     ) -> tuple[tuple[float, float], AgentState]:
-        """Twist v [m/s], omega [rad/s] and what it says. item ``(3,)`` of the object's centre of
+        """Twist v [m/s], omega [rad/s] and the state to be broadcast. item ``(3,)`` of the object's
+        centre of
         mass; pose ``(3,)`` of the robot; others ``(k, 3)`` x, y, radius [m] of what else stands."""
         late = now - self.settings.forget
         self._heard = {n: w for n, w in sorted(self._heard.items()) if w.time >= late}
@@ -97,8 +125,8 @@ class Agent:
         return twists[self.name], AgentState(self.name, now, pose, self.mean, dict(self._flows))
 
     def _agree(self, pose: Array) -> None:
-        """On the mean: what a robot has of it is its own place less what it handed on, and all that
-        hear each other hand on so much that they have the same."""
+        """A step of flow updating: a robot's estimate is its own position less its outgoing flows,
+        and flows are changed so that neighbours have equal estimates."""
         zero = np.zeros(2)
         flows = {n: self._flows.get(n, zero) for n in self._heard}
         for name in self._fresh & set(flows):

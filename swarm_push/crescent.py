@@ -1,8 +1,9 @@
-"""A density fitted to an object's outline and to the way that the object is to move.
+"""A density fitted to an object's outline and to its desired motion.
 
-It lies along the line of the robots that touch the object, more of it where the outline flees
-inward faster: behind an object that is to go ahead it is a crescent, about one that is to turn it
-has a horn at every side that can turn it. Robots that find no room on the line press from behind.
+It lies along the object's rim and is larger where the outline recedes faster from a robot there.
+For an object that is to move ahead it is a crescent behind it; for one that is to turn it has a
+maximum at every side from which the object can be turned. Robots that find no room on the rim queue
+behind it.
 """
 
 import numpy as np

@@ -1,11 +1,10 @@
-"""A law that pushes with a crescent: robots go round the object to where it is pushed from, find
-hold of it together, and move on with it.
+"""The crescent law: robots enclose the pushed side of an object and push it with a given twist.
 
-The density lies along the object's rim where the twist that the object is to have moves the outline
-away from the robots (``crescent.py``). Robots go to the centroids of their cells, round the object
-where it is in the way. As soon as those at the object can make most of the wrench that the motion
-takes, the density moves on with the object's wanted twist, and every robot with it: a moving
-density is followed by its own velocity and Lloyd's control together.
+The density to be covered lies along the object's rim, where the desired twist moves the outline
+away from the robots (``crescent.py``). Each robot moves to the centroid of its Voronoi cell
+(Lloyd's control), round the object where that is in the way. As soon as the robots in contact can
+make most of the wrench that the motion needs, the density moves with the desired twist. Robots then
+follow it by feed-forward of its velocity plus Lloyd's control.
 """
 
 import math
@@ -35,26 +34,115 @@ _WORSE = 0.1  # part of the wrench that may lack beyond what lacked at the begin
 
 @settings
 class CrescentLawSettings:
-    """Speeds, and what counts as hold."""
+    """Speeds, and when robots are in place to push.
 
-    speed: float = bounded(0.85, low=0.05, high=1.0, doc="of a push, over the robots' greatest")
-    slowing: float = bounded(1.0, low=0.01, high=10.0, doc="[1/s] of the way that is left")
-    least_speed: float = bounded(0.2, low=0.0, high=1.0, doc="of a push, over the robots' greatest")
-    gain: float = bounded(3.0, low=0.01, high=100.0, doc="[1/s] towards centroids")
-    shift: float = bounded(0.3, low=0.0, high=100.0, doc="[1/s] likewise, of those that push")
-    press: float = bounded(0.01, low=0.0, high=1.0, doc="[m] of the density into the object")
-    wait: float = bounded(6e-3, low=0.0, high=1.0, doc="[m] from it until the push begins")
-    clearance: float = bounded(0.02, low=1e-3, high=1.0, doc="[m] of robots that go round it")
-    slide: float = bounded(
-        0.015, low=0.0, high=0.04, doc="[m] into it that one which slides along it may head"
+    The robots *hold* the object when the forces of those in contact, within their friction cones,
+    make the wrench of the desired motion but for a part that may lack.
+    """
+
+    speed: float = bounded(
+        0.85,
+        low=0.05,
+        high=1.0,
+        doc="Push speed as a fraction of the robot's maximum speed (dimensionless)",
     )
-    contact: float = bounded(0.015, low=1e-3, high=1.0, doc="[m] from it that count as hold")
-    least: float = bounded(0.3, low=0.0, high=0.99, doc="part of the approach that makes a place")
-    hold: float = bounded(0.25, low=0.0, high=1.0, doc="part of the wrench that may lack to begin")
-    patience: float = bounded(3.0, low=0.0, high=600.0, doc="[s] at most for who is in front")
-    stuck: float = bounded(12.0, low=1.0, high=600.0, doc="[s] at a wall until it is left")
-    budge: float = bounded(0.02, low=1e-3, high=1.0, doc="[m] onward in that time that will do")
-    lost: float = bounded(0.7, low=0.0, high=1.0, doc="part that may lack as they push")
+    slowing: float = bounded(
+        1.0,
+        low=0.01,
+        high=10.0,
+        doc="Push speed near the target, divided by the remaining distance (1/s)",
+    )
+    least_speed: float = bounded(
+        0.2,
+        low=0.0,
+        high=1.0,
+        doc="Lowest push speed as a fraction of the robot's maximum speed (dimensionless)",
+    )
+    gain: float = bounded(
+        3.0,
+        low=0.01,
+        high=100.0,
+        doc="Proportional gain of a robot's velocity towards the centroid of its cell (1/s)",
+    )
+    shift: float = bounded(
+        0.3,
+        low=0.0,
+        high=100.0,
+        doc="The same gain along the rim for a robot that pushes; low, because wheels that slip "
+        "sideways transmit no push (1/s)",
+    )
+    press: float = bounded(
+        0.01,
+        low=0.0,
+        high=1.0,
+        doc="Distance by which the density lies inside the line of contact during a push, so that "
+        "robots keep pressing (m)",
+    )
+    wait: float = bounded(
+        6e-3,
+        low=0.0,
+        high=1.0,
+        doc="Distance from the line of contact at which robots wait until the push begins (m)",
+    )
+    clearance: float = bounded(
+        0.02,
+        low=1e-3,
+        high=1.0,
+        doc="Gap to the object that robots keep while they go round it (m)",
+    )
+    slide: float = bounded(
+        0.015,
+        low=0.0,
+        high=0.04,
+        doc="Depth inside the line of contact at which a robot that slides along the object may "
+        "head for its place (m)",
+    )
+    contact: float = bounded(
+        0.015,
+        low=1e-3,
+        high=1.0,
+        doc="Distance from the line of contact within which a robot counts as in contact (m)",
+    )
+    least: float = bounded(
+        0.3,
+        low=0.0,
+        high=0.99,
+        doc="Places on the rim are used where the outline recedes from a robot at least this "
+        "fraction as fast as where it does so fastest (dimensionless)",
+    )
+    hold: float = bounded(
+        0.25,
+        low=0.0,
+        high=1.0,
+        doc="Part of the needed wrench that robots in contact may fail to make when a push begins "
+        "(dimensionless)",
+    )
+    patience: float = bounded(
+        3.0,
+        low=0.0,
+        high=600.0,
+        doc="Longest time to wait for robots in front of the object to leave, and for a better "
+        "hold (s)",
+    )
+    stuck: float = bounded(
+        12.0,
+        low=1.0,
+        high=600.0,
+        doc="Time without progress at a wall after which the object is moved away from it (s)",
+    )
+    budge: float = bounded(
+        0.02,
+        low=1e-3,
+        high=1.0,
+        doc="Motion along the desired twist in that time that counts as progress (m)",
+    )
+    lost: float = bounded(
+        0.7,
+        low=0.0,
+        high=1.0,
+        doc="Part of the needed wrench that robots in contact fail to make at which a push is "
+        "interrupted (dimensionless)",
+    )
 
 
 class CrescentLaw:
@@ -252,7 +340,7 @@ class CrescentLaw:
     def _bounds(self, nearest: Nearest, twist: Array, held: Mask) -> tuple[Array, Array]:
         """Inward normals ``(n, 2)`` and how fast ``(n,)`` [m/s] robots may go along them: as fast
         as the object flees, and by so much of the gap that may close. Only those that push may
-        press; whoever leans on others does not press through them."""
+        press: a robot that touches another robot is not driven further towards it."""
         s = self.settings
         k, depth = nearest
         fleeing = self._fine.approach(twist)[k] if self._pushing else np.zeros(len(k))

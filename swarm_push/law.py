@@ -1,7 +1,7 @@
-"""What every law of a swarm sees and says.
+"""The interface of a swarm law: what it gets at a tick, and what it returns.
 
-A law sees where the object and the robots are and says how fast each robot is to go, and over which
-density the swarm spreads. It is written for robots that go in any direction.
+A law gets the poses of the object and of the robots. It returns a velocity for each robot and the
+density that the swarm covers. It is written for robots that move in any direction.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from swarm_push.density import Density
 
 
 class SwarmPhase(Enum):
-    """What a swarm is at."""
+    """What a swarm is doing."""
 
     GATHER = "gather"
     GO_ROUND = "go round"
@@ -23,7 +23,7 @@ class SwarmPhase(Enum):
 
 @dataclass(frozen=True)
 class Scene:
-    """What a law sees.
+    """The input of a law at one tick.
 
     time: [s]. pose ``(3,)`` of the object's centre of mass. robots ``(n, 2)`` [m]. target ``(3,)``:
     where the centre of mass is to be, its heading nan where any will do. others ``(k, 3)`` x, y,

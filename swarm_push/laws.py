@@ -16,7 +16,11 @@ from swarm_push.walls import Walls
 class LawSettings:
     """Which law moves a swarm."""
 
-    law: Literal["crescent", "thesis"] = bounded("crescent", doc="ours, or as printed")
+    law: Literal["crescent", "thesis"] = bounded(
+        "crescent",
+        doc="Law that moves the swarm: 'crescent' pushes with a density along the object's rim, "
+        "'thesis' is the law of chapter 4 as printed",
+    )
 
 
 @dataclass(frozen=True)

@@ -18,11 +18,32 @@ _ZERO = 1e-12
 class PotentialSettings:
     """Sizes of the zones, in radii of the object, as printed."""
 
-    repulsion: float = bounded(1.4, low=1.0, high=10.0, doc="d_rep over the object's radius")
-    attraction: float = bounded(1.8, low=1.0, high=10.0, doc="d_att likewise")
-    cone: float = bounded(0.8, low=0.5, high=0.99, doc="gamma_lim over pi: behind begins there")
-    wires: float = bounded(0.7, low=0.1, high=1.0, doc="of W_in and W_out from it, likewise")
-    overlap: float = bounded(0.1, low=0.0, high=0.5, doc="part by which zones 3 and 4 are wider")
+    repulsion: float = bounded(
+        1.4, low=1.0, high=10.0, doc="Radius d_rep of the repulsive zone, in radii of the object"
+    )
+    attraction: float = bounded(
+        1.8, low=1.0, high=10.0, doc="Radius d_att of the attractive zone, in radii of the object"
+    )
+    cone: float = bounded(
+        0.8,
+        low=0.5,
+        high=0.99,
+        doc="Angle gamma_lim from the direction of motion beyond which a robot is behind the "
+        "object, as a fraction of pi (dimensionless)",
+    )
+    wires: float = bounded(
+        0.7,
+        low=0.1,
+        high=1.0,
+        doc="Distance of the wires W_in and W_out from the object's centre, in radii of the object",
+    )
+    overlap: float = bounded(
+        0.1,
+        low=0.0,
+        high=0.5,
+        doc="Part by which zones 3 and 4 are widened so that neighbouring zones overlap "
+        "(dimensionless)",
+    )
 
 
 def direction_to(item: Array, target: Array) -> Array:

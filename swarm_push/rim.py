@@ -1,4 +1,4 @@
-"""The line on which the centres of round robots lie that touch an object."""
+"""The rim of an object: the line on which the centres of round robots in contact with it lie."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,8 @@ _STEP = 2e-3  # [m] between points of the line at notches
 _FLAT = 1e-9  # of an area: what an outline lacks of its hull's without having a notch
 
 Nearest = tuple[NDArray[np.int64], Array]
-"""Which of a rim's points ``(n,)`` is the nearest to each of some others, and how far ``(n,)`` [m]
-these lie inward of it, negative outside."""
+"""Index ``(n,)`` of the rim point that is nearest to each given point, and depth ``(n,)`` [m] of
+the given point inside of it, negative outside."""
 
 
 class Rim:
@@ -50,16 +50,16 @@ class Rim:
         return k, depth
 
     def approach(self, twist: Array) -> Array:
-        """``(m,)`` [m/s] at which the points flee inward when the object moves with a twist
-        ``(3,)`` in its frame: where that is much, robots push it so."""
+        """``(m,)`` [m/s] speed of the rim along its inward normal when the object moves with a
+        twist ``(3,)`` in its frame. Robots push the object with that twist where it is positive."""
         moved = point_velocities(twist, self.points)
         speed: Array = (moved * self.normals).sum(axis=1)
         return speed
 
     def drive(self, twist: Array, friction: float) -> Array:
-        """``(m,)`` [m/s] how well robots at the points drive a twist: by the approach; where that
-        is less everywhere than what friction drives along the line, as for a disc that turns, by
-        both."""
+        """``(m,)`` [m/s] how well a robot at each point drives a twist: its normal speed; where
+        that is everywhere less than what friction can drive along the rim, as for a disc that
+        turns, the sum of both."""
         approach = self.approach(twist)
         slip = friction * np.abs(
             (point_velocities(twist, self.points) @ _TURN * self.normals).sum(1)

@@ -1,8 +1,22 @@
-"""Robots that keep apart: velocities changed as little as need be. Compiled.
+"""Robots keep apart: pairwise velocity constraints, and the projection of velocities on them.
 
-Two robots may come closer by so much of the gap between them in a second; what they lack of that,
-each of both gives half, or the one that moves all of it. Robots that push side by side move alike
-and are not touched by it.
+Two robots i and j with a gap g between them, and n the unit vector from i to j, may close the gap
+at most in proportion to what exceeds the gap g0 that is kept:
+
+    (v_i - v_j) . n <= rate (g - g0)
+
+This is the constraint of a control barrier function h = g - g0 with dh/dt >= -rate h, for robots
+whose velocity is the input; with it, h >= 0 stays true. Wang, Ames and Egerstedt, "Safety barrier
+certificates for collisions-free multirobot systems" (T-RO 2017), share a constraint between the two
+robots of a pair likewise, there on accelerations. Unlike a (reciprocal) velocity obstacle, which
+excludes all relative velocities that collide within a time horizon, it bounds one component of the
+relative velocity, is linear, and does not affect robots that move side by side at equal velocities.
+
+The velocities are changed by cyclic projection: each violated constraint in turn is met by the
+least change of the velocities in it, half by each robot, or all of it by the one that moves. Sweeps
+end when no constraint is violated by more than 0.1 mm/s, or after eight. The result is close to,
+but not exactly, the nearest feasible velocities; what is left over is small, and corrected at the
+next tick. Walls and the object bound single velocities in the same way. Compiled.
 """
 
 import math
@@ -25,12 +39,15 @@ def keep_apart(
     reach: float,
     bounds: Array | None = None,
 ) -> Array:
-    """Velocities ``(n, 2)`` [m/s] of the first n bodies at ``(m, 2)`` [m], changed; further bodies
-    stand.
+    """Velocities ``(n, 2)`` [m/s] of the robots that meet the constraints, or nearly so.
 
-    radii: ``(m,)`` [m]. gap: [m] between bodies that is kept. rate: [1/s] of the gap beyond it that
-    may close. reach: [m] of gaps up to which pairs are looked at. bounds: ``(b, n, 3)`` unit
-    vectors for each robot and how fast [m/s] it may go along them.
+    Parameters
+    ----------
+    velocities: ``(n, 2)`` [m/s] that are wanted, of the first n bodies; the other bodies stand.
+    points: ``(m, 2)`` [m] of all bodies; radii: ``(m,)`` [m].
+    gap: [m] g0. rate: [1/s].
+    reach: [m] of gaps beyond which a pair is left out.
+    bounds: ``(b, n, 3)`` unit vectors, and the highest speed [m/s] of each robot along them.
     """
     moved = np.zeros((len(points), 2))
     moved[: len(velocities)] = velocities

@@ -8,59 +8,40 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from push_model import se2
-from push_model.arrays import Array, Mask
+from push_model.arrays import Array
 from push_model.drives import HolonomicDrive
 from push_model.jobs import JobError, JobPhase
 from push_model.object_way import NoObjectWay
 from push_model.occupancy import OccupancyGrid
-from push_model.outlines import distance
-from push_model.settings import bounded, settings
 from push_model.specs import ObjectSpec, RobotSpec
+from swarm_push.arrival import Arrival, pose_errors
+from swarm_push.contacts import find_contacts
+from swarm_push.feasibility import Assessment, Feasibility, Strength, least_contacts, too_few
+from swarm_push.job_settings import SwarmJobSettings
 from swarm_push.law import Scene, SwarmPhase, SwarmStep
 from swarm_push.laws import LawSections, make_law
 from swarm_push.liveness import LivenessCheck
 from swarm_push.object_track import ObjectTrack, TrackSettings
+from swarm_push.progress import Progress, TargetQueue
 from swarm_push.spacing import keep_apart
 from swarm_push.walls import Walls
 
+__all__ = ["SwarmJob", "SwarmJobSettings"]
 _STATES = {
     SwarmPhase.GATHER: (JobPhase.POSITIONING, "robots gather at the object"),
     SwarmPhase.GO_ROUND: (JobPhase.POSITIONING, "robots go round the object"),
     SwarmPhase.REALIGN: (JobPhase.APPROACH, "robots look for hold"),
     SwarmPhase.PUSH: (JobPhase.PUSHING, "robots push"),
 }
-_CLOSER = 5e-3  # [m] that counts as progress
-_AT = 0.01  # [m] of a gap to a robot within which something may hold it up
-
-
-@settings
-class SwarmJobSettings:
-    """When a target is reached, when a job is given up, and how robots move."""
-
-    position_tolerance: float = bounded(0.02, low=1e-3, high=10.0, doc="[m] of a target")
-    orientation_tolerance: float = bounded(0.05, low=1e-3, high=4.0, doc="[rad] likewise")
-    orientation: bool = bounded(True, doc="whether headings of goals matter")
-    stalled: float = bounded(90.0, low=1.0, high=3600.0, doc="[s] without coming closer: given up")
-    alone: float = bounded(10.0, low=0.0, high=3600.0, doc="[s] without any robot: given up")
-    dead: float = bounded(2.0, low=0.1, high=60.0, doc="[s] that a robot may not do as told")
-    dead_way: float = bounded(0.1, low=1e-3, high=10.0, doc="[m] that it should have gone then")
-    jammed: float = bounded(6.0, low=0.1, high=600.0, doc="[s] likewise of one that is touched")
-    again: float = bounded(30.0, low=1.0, high=1e6, doc="[s] until such a robot is tried again")
-    apart: float = bounded(4e-3, low=0.0, high=1.0, doc="[m] between robots")
-    closing: float = bounded(3.0, low=0.01, high=100.0, doc="[1/s] of gaps between robots")
-    lead: float = bounded(0.025, low=1e-3, high=1.0, doc="[m] of the controlled point ahead")
 
 
 class SwarmJob:
     """One job at a time of robots of one type.
 
-    state, reason, error: as in JobState. targets: of the job, poses ``(3,)`` of the centre of mass,
-    headings nan where any will do; index: of the one under way; times: [s] that each took. last:
-    what the last tick came from, and taking_part: the robots that it is about. region: as given.
-    holonomic: whether robots go in any direction.
+    state, reason, error: as in JobState. last: what the law said at the last tick, and taking_part:
+    the robots that it is about. region: as given. holonomic: whether robots move in any direction.
+    track: the planner of the object's way among obstacles; None without a map.
     """
 
     def __init__(
@@ -80,7 +61,7 @@ class SwarmJob:
         self.holonomic = isinstance(robot.drive, HolonomicDrive)
         self._drive = None if self.holonomic else robot.differential
         self._speed, self._radius = robot.max_speed, robot.footprint_radius
-        walls, self._walls, self.track = None, None, None
+        walls, self._walls, self.track, self._grid = None, None, None, grid
         if grid is not None:
             walls = Walls(grid, self._radius)
             self._walls = None if walls.open else walls
@@ -98,16 +79,14 @@ class SwarmJob:
         self._outline = item.geometry.outline
         self._lever = float(np.hypot(*self._outline.T).max())
         self.state, self.reason, self.error = JobPhase.IDLE, "waiting for a goal", JobError.NONE
-        self.targets: tuple[Array, ...] = ()
-        self.index = 0
-        self.times: list[float] = []
         self.last: SwarmStep | None = None
         self.taking_part: tuple[str, ...] = ()
-        s, wheels = self.settings, not self.holonomic
-        self._liveness = LivenessCheck(s.dead, s.dead_way, s.jammed, s.again, wheels)
-        self._begun: float | None = None
-        self._nearest = math.inf
-        self._progress = self._seen = 0.0
+        self._queue, self._progress = TargetQueue(), Progress()
+        self._liveness = LivenessCheck(self.settings, wheels=not self.holonomic)
+        self._arrival = Arrival(self.settings)
+        self._robot = robot
+        self._feasibility = Feasibility(item, robot, grid, self.track)
+        self._strengths: dict[int, Strength] = {}  # of so many robots, for the present target
 
     def warm_up(self) -> None:
         """Load what is compiled, so that the first command does not wait."""
@@ -118,7 +97,7 @@ class SwarmJob:
         self.begin([np.array([*(middle + 0.1), 0.0])])
         self.step(0.0, np.array([*middle, 0.0]), robots, np.array([[*middle, 0.01]]))
         self.end(JobError.NONE, "waiting for a goal")
-        self.targets, self.taking_part = (), ()
+        self._queue, self.taking_part = TargetQueue(), ()
         self._new_way()
 
     @property
@@ -132,29 +111,50 @@ class SwarmJob:
         return frozenset(self._liveness.dead)
 
     @property
+    def targets(self) -> tuple[Array, ...]:
+        """Of the job, poses ``(3,)`` of the centre of mass, headings nan where any will do."""
+        return self._queue.poses
+
+    @property
+    def index(self) -> int:
+        """Of the target that is pursued; the number of targets when all are reached."""
+        return self._queue.index
+
+    @property
+    def times(self) -> list[float]:
+        """[s] that each target took that was reached."""
+        return self._queue.times
+
+    @property
     def target(self) -> Array | None:
         """``(3,)`` that is pursued, or was last."""
-        return self.targets[min(self.index, len(self.targets) - 1)] if self.targets else None
+        return self._queue.current
+
+    def assess(self, target: Array, pose: Array, robots: Mapping[str, Array]) -> Assessment:
+        """Of a target before it is begun: whether it can be reached, by how many robots, with which
+        margin. Arguments as of ``step``; a job that is under way is not touched."""
+        return self._feasibility.assess(target, pose, robots)
 
     def begin(self, targets: Sequence[Array]) -> None:
         """Take targets, at least one; no job is under way."""
-        self.targets = tuple(np.array(t, dtype=np.float64) for t in targets)
-        self.error, self.index, self.times = JobError.NONE, 0, []
-        self._begun = None
+        self._queue, self.error = TargetQueue.of(targets), JobError.NONE
         self.revive()
         self._new_way()
         self.state, self.reason = JobPhase.POSITIONING, "robots gather at the object"
 
     def retarget(self, target: Array) -> None:
         """The target that is pursued was moved."""
-        moved = np.array(target, dtype=np.float64)
-        self.targets = (*self.targets[: self.index], moved, *self.targets[self.index + 1 :])
-        self._nearest = math.inf
+        self._queue.replace_current(target)
+        self._arrival.restart()
+        self._strengths.clear()
+        self._progress.forget()
         if self.track is not None:
             self.track.clear()
 
     def _new_way(self) -> None:
         self._law.reset()
+        self._strengths.clear()
+        self._arrival.restart()
         if self.track is not None:
             self.track.clear()
 
@@ -169,8 +169,8 @@ class SwarmJob:
         self._liveness.revive()
 
     def believe(self, item: ObjectSpec) -> None:
-        """Go on with another object than before: the law is made anew for it, and the way where
-        its outline is another one."""
+        """Go on with another object than before: the law and what its robots can push are made anew
+        for it, and the way where its outline is another one."""
         outline = item.geometry.outline
         if not np.array_equal(outline, self._outline):
             self._outline = outline
@@ -179,14 +179,13 @@ class SwarmJob:
                 track = self.track
                 self.track = ObjectTrack(track.field, outline, self._radius, track.settings)
         self._law = self._make_law(item)
+        self._feasibility = Feasibility(item, self._robot, self._grid, self.track)
+        self._strengths.clear()
 
     def errors(self, pose: Array) -> tuple[float, float]:
         """[m], [rad] from the target that is pursued; no heading counts as none off."""
         target = self.target
-        if target is None:
-            return math.inf, math.inf
-        turn = 0.0 if math.isnan(target[2]) else abs(se2.wrap(float(pose[2] - target[2])))
-        return math.hypot(pose[0] - target[0], pose[1] - target[1]), turn
+        return (math.inf, math.inf) if target is None else pose_errors(pose, target)
 
     def step(
         self,
@@ -202,10 +201,12 @@ class SwarmJob:
         stands about. mean ``(2,)`` [m] of all robots, where only some are seen."""
         if not self.busy:
             return dict.fromkeys(robots, (0.0, 0.0))
-        if self._begun is None:
-            self._begun = self._progress = self._seen = now
-            self._nearest = math.inf
-        if self._reached(now, pose) or self._given_up(now, pose, robots):
+        if self._queue.begun is None:
+            self._queue.begun = now
+            self._progress.begin(now)
+        self._arrival.see(now, pose)
+        whole = mean is None  # else only neighbours are known
+        if self._reached(now) or self._given_up(now, pose, robots, whole):
             return dict.fromkeys(robots, (0.0, 0.0))
         tried = self._liveness.try_again(now, robots)
         names = tuple(n for n in robots if n not in self._liveness.dead)
@@ -221,12 +222,12 @@ class SwarmJob:
         self.last = step = self._law.step(scene)
         self.state, self.reason = _STATES[step.phase]
         velocities = self._spaced(step, poses[:, :2], fixed)
-        twists, moved = velocities, np.column_stack([velocities, np.zeros(len(velocities))])
+        moved = np.column_stack([velocities, np.zeros(len(velocities))])
         if self._drive is not None:
-            twists = moved = self._drive.follow(velocities, poses[:, 2], self.settings.lead)
-        touched = self._touched(pose, poses[:, :2], fixed)
-        tested = self._liveness.step(now, names, poses, moved, touched)
-        twists = tested if self._drive is not None else twists
+            moved = self._drive.follow(velocities, poses[:, 2], self.settings.lead)
+        contacts = find_contacts(pose, self._outline, poses[:, :2], self._radius, fixed)
+        tested = self._liveness.step(now, names, poses, moved, contacts)
+        twists = tested[:, :2]
         told = {n: (float(v), float(w)) for n, (v, w) in zip(names, twists, strict=True)}
         told |= tried
         return {n: told.get(n, (0.0, 0.0)) for n in robots}
@@ -239,7 +240,7 @@ class SwarmJob:
         if track is None or (self._walls is None and not len(fixed)):
             if track is not None and track.under_way:
                 track.clear()
-                self._nearest = math.inf
+                self._progress.forget()
             return target
         try:
             aim, fresh = track.follow(now, pose, target, fixed, self._walls is not None)
@@ -247,7 +248,7 @@ class SwarmJob:
             self.end(JobError.PLANNING_FAILED, str(error))
             return None
         if fresh:
-            self._nearest = max(self._nearest, track.left(pose))
+            self._progress.allow(track.left(pose))
         return aim
 
     def _spaced(self, step: SwarmStep, points: Array, fixed: Array) -> Array:
@@ -265,58 +266,61 @@ class SwarmJob:
         apart = keep_apart(slowed, bodies, radii, s.apart, s.closing, reach, bounds)
         return _limited(apart, speed)
 
-    def _reached(self, now: float, pose: Array) -> bool:
+    def _reached(self, now: float) -> bool:
         """Whether the job is over; a target that is reached makes room for the next."""
-        s = self.settings
-        while True:
-            away, turned = self.errors(pose)
-            if away > s.position_tolerance or turned > s.orientation_tolerance:
+        while (target := self._queue.current) is not None:
+            if not self._arrival.reached(now, target):
                 return False
-            assert self._begun is not None
-            self.times.append(now - self._begun - sum(self.times))
-            self.index += 1
-            self._nearest, self._progress = math.inf, now
+            self._queue.advance(now)
+            self._progress.nearest, self._progress.closer = math.inf, now
             self._new_way()
-            if self.index >= len(self.targets):
+            if self._queue.finished:
+                away, turned = pose_errors(self._arrival.estimate, target)
                 self.end(JobError.NONE, f"at the goal: {1e3 * away:.1f} mm, {turned:.3f} rad")
                 return True
+        return False
 
-    def _given_up(self, now: float, pose: Array, robots: Mapping[str, Array]) -> bool:
-        s = self.settings
-        alive = [n for n in robots if n not in self._liveness.dead]
-        if alive:
-            self._seen = now
-        elif now - self._seen > s.alone:
-            text = "no robot does as it is told" if robots else "there is no robot"
-            self.end(JobError.POSITIONING_FAILED, text)
+    def _given_up(self, now: float, pose: Array, robots: Mapping[str, Array], whole: bool) -> bool:
+        """Whether the job has ended for want of robots or progress. whole: whether robots are all
+        that there are."""
+        s, alive = self.settings, sum(n not in self._liveness.dead for n in robots)
+        strength = self._strength(pose, alive) if whole and alive else None
+        if alive and (strength is None or strength.too_heavy is None):
+            self._progress.able = now
+        elif now - self._progress.able > s.alone:
+            if strength is not None and strength.too_heavy is not None:
+                self.end(JobError.TOO_HEAVY, strength.too_heavy)
+            else:
+                text = "no robot does as it is told" if robots else "there is no robot"
+                self.end(JobError.POSITIONING_FAILED, text)
             return True
         away, turned = self.errors(pose)
         left = away + self._lever * turned
         if self.track is not None and self.track.under_way:
             left = self.track.left(pose)
-        if left < self._nearest - _CLOSER:
-            self._nearest, self._progress = left, now
-        if now - self._progress > s.stalled:
+        self._progress.look(now, left)
+        doubt = self._doubt(alive, strength) if whole else ""
+        stalled = min(s.stalled, s.doubtful) if doubt else s.stalled
+        if now - self._progress.closer > stalled:
             text = f"the object has come no closer than {1e3 * away:.0f} mm and {turned:.2f} rad"
-            self.end(JobError.EXECUTION_FAILED, f"{text} for {s.stalled:g} s")
+            self.end(JobError.EXECUTION_FAILED, f"{text} for {stalled:g} s{doubt}")
             return True
         return False
 
-    def _touched(self, pose: Array, points: Array, fixed: Array) -> Mask:
-        """Which robots something is at, so that they may be held up whatever they are told."""
-        near = self._radius + _AT
-        radii = np.concatenate([np.full(len(points), self._radius), fixed[:, 2]])
-        tree = cKDTree(points)
-        touched = np.zeros(len(points), dtype=np.bool_)
-        for i, j in tree.query_pairs(near + self._radius):
-            touched[[i, j]] = True
-        if len(fixed):
-            away = np.hypot(*(points[:, None] - fixed[None, :, :2]).transpose(2, 0, 1))
-            touched |= (away < near + radii[len(points) :]).any(axis=1)
-        local = se2.transform(se2.inverse(pose), points)
-        close = np.hypot(*local.T) < self._lever + near
-        touched[close] |= distance(self._outline, local[close]) < near
-        return touched
+    def _doubt(self, robots: int, strength: Strength | None) -> str:
+        """What speaks against success with so many robots, if anything does."""
+        target = self._queue.current
+        if target is not None and robots < (least := least_contacts(target)):
+            return f"; {too_few(robots, least)}"
+        return f"; it {strength}" if strength is not None and strength.thin else ""
+
+    def _strength(self, pose: Array, robots: int) -> Strength:
+        """Of so many robots, looked at once for each number."""
+        target = self._queue.current
+        assert target is not None
+        if robots not in self._strengths:
+            self._strengths[robots] = self._feasibility.strength(pose, target, robots)
+        return self._strengths[robots]
 
 
 def _limited(velocities: Array, speed: float) -> Array:

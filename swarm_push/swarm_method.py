@@ -12,7 +12,6 @@ from push_model.arrays import Array
 from push_model.belief import Belief
 from push_model.bumpers import RingBumper
 from push_model.drives import HolonomicDrive, SpeedDrive
-from push_model.free_space import FreeSpace
 from push_model.jobs import JobError, JobPhase
 from push_model.settings import SettingsError
 from push_model.specs import ObjectSpec, RobotSpec
@@ -68,7 +67,6 @@ class SwarmMethod:
     def __init__(self, arena: Arena) -> None:
         self._arena, self._item = arena, arena.item
         self._law = arena.section("law", LawSettings).law
-        self._space = FreeSpace(arena.grid)
         self._coverage: Coverage | None = None
         self.job = swarm_job(arena)
 
@@ -89,15 +87,29 @@ class SwarmMethod:
         )
 
     def assess(self, task: Task, belief: Belief, seen: Seen | None) -> Certificate | Refusal:
-        """See Method: whether the object fits at every target."""
+        """See Method: whether the object fits at every target, a way leads there, and the robots
+        that are seen can push it. The margin is the force to spare over the force needed."""
         item = belief.object(self._arena.object)
-        reach = float(np.hypot(*item.outline.T).max())
-        for target in task.targets:
-            roomy = self._space.clearance(target[None, :2])[0] >= reach
+        if item != self._item and not self.job.busy:
+            self._take_up(belief)
+        targets = [_centre(item, t) for t in task.targets]
+        if seen is None:
             track = self.job.track
-            if not (roomy if track is None else track.fits(_centre(item, target))):
+            if track is not None and not all(track.fits(t) for t in targets):
                 return Refusal(JobError.GOAL_OCCUPIED, "the object does not fit there")
-        return Certificate()
+            return Certificate()
+        pose, robots, margin, seconds = item.mass_pose(seen.object), 1, math.inf, 0.0
+        for target in targets:
+            found = self.job.assess(target, pose, seen.robots)
+            if not found.accepted:
+                return Refusal(found.code, found.reason)
+            heading = pose[2] if math.isnan(target[2]) else target[2]
+            pose = np.array([target[0], target[1], heading])
+            robots = max(robots, found.needed or 0)
+            if found.force > 0.0:
+                margin = min(margin, found.margin / found.force)
+            seconds += found.seconds
+        return Certificate(robots, margin, seconds)
 
     def begin(self, task: Task, belief: Belief) -> None:
         """See Method."""

@@ -14,10 +14,28 @@ from swarm_push.potential import PotentialSettings, direction_to, swarm_input
 class ThesisLawSettings(PotentialSettings):
     """Of section 4.3. Zero deviations follow from the number of robots, as printed."""
 
-    sigma_x: float = bounded(0.0, low=0.0, high=10.0, doc="[m] tangential to the object")
-    sigma_y: float = bounded(0.0, low=0.0, high=10.0, doc="[m] towards it")
-    lead: float = bounded(0.1, low=1e-3, high=10.0, doc="[m] dt of (4.4) times a unit of u_swarm")
-    gain: float = bounded(1.0, low=1e-3, high=100.0, doc="[1/s] of Lloyd's control")
+    sigma_x: float = bounded(
+        0.0,
+        low=0.0,
+        high=10.0,
+        doc="Standard deviation of the density tangential to the object; 0: as printed for the "
+        "number of robots (m)",
+    )
+    sigma_y: float = bounded(
+        0.0,
+        low=0.0,
+        high=10.0,
+        doc="Standard deviation of the density towards the object; 0: as printed for the number of "
+        "robots (m)",
+    )
+    lead: float = bounded(
+        0.1,
+        low=1e-3,
+        high=10.0,
+        doc="Distance by which the density leads the mean of the swarm, per unit of u_swarm: dt of "
+        "(4.4) (m)",
+    )
+    gain: float = bounded(1.0, low=1e-3, high=100.0, doc="Gain of Lloyd's control (1/s)")
 
 
 def printed_sigmas(count: int) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""Who is dead, and who is only in a jam."""
+"""Which robots are declared dead, and which are only held up."""
 
 import math
 
@@ -12,9 +12,10 @@ from push_model.specs import EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
 from push_study.group_world import GroupWorld
 from push_study.uncertainty import uncertainty
+from swarm_push.contacts import Contacts, find_contacts
 from swarm_push.crescent_law import CrescentLaw
 from swarm_push.law import Scene
-from swarm_push.liveness import LivenessCheck
+from swarm_push.liveness import LivenessCheck, LivenessSettings
 from swarm_push.region import covered_region
 from swarm_push.rim import Rim
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
@@ -22,10 +23,19 @@ from tests.driving import drive
 
 NAMES = ("a", "b", "c")
 DT = 0.02
+SQUARE = 0.1 * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
 
 
 def call(wheels=True):
-    return LivenessCheck(2.0, 0.1, 6.0, 30.0, wheels)
+    return LivenessCheck(LivenessSettings(), wheels)
+
+
+def contacts_of(poses, touched):
+    """An object 0.15 m ahead along x of each robot that is touched; robots are far apart."""
+    at = np.flatnonzero(touched)
+    middle = poses[at].mean(axis=0)[:2] + [0.15, 0.0] if len(at) else np.zeros(2)
+    none = np.zeros((0, 2), dtype=np.intp)
+    return Contacts(poses[:, :2], touched, none, at, middle, none, np.zeros((0, 3)))
 
 
 def stand():
@@ -40,7 +50,8 @@ def play(roll, poses, obeys, touched, until, begin=0.0):
         alive = tuple(n for n in NAMES if n not in roll.dead)
         here = [NAMES.index(n) for n in alive]
         wanted = np.tile([0.1, 0.0], (len(alive), 1))
-        twists = roll.step(time, alive, poses[here], wanted, touched[here])
+        contacts = contacts_of(poses[here], touched[here])
+        twists = roll.step(time, alive, poses[here], wanted, contacts)
         tried = roll.try_again(time, {n: poses[i] for i, n in enumerate(NAMES)})
         all_told = {**dict(zip(alive, twists, strict=True)), **tried}
         told.append(all_told)
@@ -54,12 +65,26 @@ def play(roll, poses, obeys, touched, until, begin=0.0):
     return told
 
 
-def test_who_stands_in_the_open_is_dead_soon_and_nobody_else():
+def test_a_robot_that_stands_in_the_open_is_turned_first_and_dead_when_it_does_not_turn():
     roll, poses = call(), stand()
-    play(roll, poses, ("goes", "dead", "goes"), np.zeros(3, dtype=bool), 1.7)
-    assert not roll.dead
-    play(roll, poses, ("goes", "dead", "goes"), np.zeros(3, dtype=bool), 4.5, 1.7)
+    told = play(roll, poses, ("goes", "dead", "goes"), np.zeros(3, dtype=bool), 1.7)
+    assert not roll.dead and all(t["b"][1] == 0.0 for t in told)
+    told = play(roll, poses, ("goes", "dead", "goes"), np.zeros(3, dtype=bool), 4.5, 1.7)
     assert set(roll.dead) == {"b"}
+    turns = {float(t["b"][1]) for t in told if "b" in t}
+    assert max(turns) > 1.0 and min(turns) < -1.0  # both ways
+    assert all(t["a"][1] == t["c"][1] == 0.0 for t in told)
+
+
+def test_a_robot_that_is_held_up_by_what_is_not_known_to_be_there_lives():
+    """It turns when it is told to, but goes no way: an outline that is believed too small."""
+    roll, poses = call(), stand()
+    told = play(roll, poses, ("goes", "turns", "goes"), np.zeros(3, dtype=bool), 60.0)
+    assert not roll.dead
+    tested = [t["b"][1] > 1.0 for t in told]
+    begun = [k * DT for k in range(1, len(tested)) if tested[k] and not tested[k - 1]]
+    assert begun[0] < 2.2  # in the open after 2 s, then as one that is in contact: after 6 s
+    assert len(begun) > 3 and min(np.diff(begun)[:3]) > 5.0
 
 
 def test_who_is_held_up_is_dead_only_if_it_does_not_even_turn():
@@ -83,18 +108,100 @@ def test_the_dead_stay_dead_when_they_are_tried_again_and_who_turns_is_back():
     assert not roll.dead
 
 
-def test_robots_that_go_in_any_direction_are_not_told_to_turn():
-    roll = call(wheels=False)
-    time, poses = 0.0, np.zeros((3, 3))
-    twists = np.tile([0.1, 0.0, 0.0], (3, 1))
-    while time < 7.0:
+def discs(free, until, touched=True, contacts=None):
+    """Three discs that are told to go along x at 0.1 m/s; disc k moves in directions ``free[k]``
+    alone. The dead, and all commands."""
+    roll, poses, time, told = call(wheels=False), stand(), 0.0, []
+    while time < until:
         alive = tuple(n for n in NAMES if n not in roll.dead)
         here = [NAMES.index(n) for n in alive]
-        back = roll.step(time, alive, poses[here], twists[here], np.ones(len(here), dtype=bool))
-        assert np.array_equal(back, twists[here])
-        poses[0, 0] += 0.1 * DT
+        twists = np.tile([0.1, 0.0, 0.0], (len(here), 1))
+        at = contacts_of(poses[here], np.full(len(here), touched))
+        twists = roll.step(time, alive, poses[here], twists, at)
+        both = dict(zip(alive, twists[:, :2], strict=True))
+        both |= {
+            n: np.array(t)
+            for n, t in roll.try_again(time, dict(zip(NAMES, poses, strict=True))).items()
+        }
+        told.append(both)
+        for name, speed in both.items():
+            k = NAMES.index(name)
+            for way in free[k]:
+                poses[k, :2] += DT * max(0.0, float(speed @ way)) * np.array(way)
         time += DT
-    assert set(roll.dead) == {"b", "c"}
+    return roll.dead, told
+
+
+AHEAD, BACK, LEFT = np.array([1.0, 0.0]), np.array([-1.0, 0.0]), np.array([0.0, 1.0])
+
+
+def test_discs_that_press_on_something_live_as_long_as_they_can_move_away_from_it():
+    dead, told = discs(((AHEAD, BACK), (BACK,), (LEFT,)), 40.0)
+    assert not dead
+    away = [t["b"][0] < 0.0 for t in told]
+    first = away.index(True) * DT
+    assert 5.0 < first < 6.5  # tested when it has pressed for 6 s, away from the contact at once
+    assert any(t["c"][1] > 0.0 for t in told) and not any(t["a"][0] < 0.0 for t in told)
+
+
+def test_dead_discs_are_found_out_and_stay_dead_when_they_are_tried_again():
+    dead, told = discs(((AHEAD, BACK), (), ()), 9.0)
+    assert set(dead) == {"b", "c"}
+    ways = {tuple(np.sign(np.round(t["b"], 6))) for t in told if "b" in t}
+    assert {(1, 0), (-1, 0), (0, 1), (0, -1)} <= ways
+    dead, told = discs(((AHEAD, BACK), (), ()), 60.0)
+    assert set(dead) == {"b", "c"}
+    tried = [k * DT for k, t in enumerate(told) if "b" in t and k * DT > 12.0]
+    assert tried and 30.0 < tried[0] < 42.0
+
+
+def test_neighbours_stop_pressing_while_a_robot_is_tested_that_did_not_turn_at_once():
+    """Robot b can turn only while a does not press on it."""
+    roll, poses, time, turned = call(), stand()[:2], 0.0, []
+    poses[1, 1] = 0.1
+    while time < 12.0:
+        contacts = find_contacts(
+            np.array([9.0, 9, 0]), SQUARE, poses[:, :2], 0.05, np.zeros((0, 3))
+        )
+        assert set(map(tuple, contacts.pairs)) == {(0, 1)} and contacts.touched.all()
+        alive = tuple(n for n in NAMES[:2] if n not in roll.dead)
+        assert alive == NAMES[:2]
+        twists = roll.step(time, alive, poses, np.tile([0.1, 0.0], (2, 1)), contacts)
+        pressed = twists[0].any()
+        if not pressed:
+            poses[1, 2] += DT * twists[1, 1]
+            turned.append(time)
+        poses[0, 2] += DT * twists[0, 1]
+        time += DT
+    assert turned and not roll.dead
+
+
+def test_who_flickers_out_of_sight_hides_nobody_who_is_dead():
+    """Robot c is seen in every second frame alone: b, which stands in the open, is found out."""
+    roll, poses = call(), stand()
+    for k in range(250):
+        names = tuple(n for n in NAMES[: 2 + k % 2] if n not in roll.dead)
+        here = [NAMES.index(n) for n in names]
+        contacts = contacts_of(poses[here], np.zeros(len(here), dtype=bool))
+        twists = roll.step(
+            k * DT, names, poses[here], np.tile([0.1, 0.0], (len(here), 1)), contacts
+        )
+        for n, (v, _) in zip(names, twists, strict=True):
+            poses[NAMES.index(n), 0] += 0.0 if n == "b" else DT * v * (2.0 if n == "c" else 1.0)
+    assert set(roll.dead) == {"b"}
+
+
+def test_contacts_and_the_way_out_of_them():
+    """Discs of 5 cm about a square of 20 cm: gaps up to 1 cm count, by hand."""
+    points = np.array([[-0.155, 0.0], [-0.255, 0.0], [0.0, 0.165], [0.5, 0.5], [0.62, 0.5]])
+    fixed = np.array([[0.5, 0.65, 0.1]])
+    contacts = find_contacts(np.zeros(3), SQUARE, points, 0.05, fixed)
+    assert contacts.touched.tolist() == [True, True, False, True, False]
+    assert set(map(tuple, contacts.pairs)) == {(0, 1)} and contacts.neighbours(1) == {0}
+    assert np.allclose(contacts.away(1), [-1.0, 0.0]) and np.allclose(contacts.away(3), [0.0, -1.0])
+    assert not contacts.away(0).any()  # between the object and a robot
+    turned = find_contacts(np.array([0.0, 0.0, 0.25 * math.pi]), SQUARE, points, 0.05, fixed)
+    assert turned.at_object.tolist() == [0, 2]  # corners reach out to 0.141 m
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -1,0 +1,254 @@
+"""Whether a swarm can bring an object to a target, before it tries. No ROS, no clock.
+
+Refused is only what is shown to be impossible: an object that no placement of the robots at hand
+can keep sliding (``rim_capacity.py``), a target that no way leads to, robots that walls keep from
+the object. What is accepted may still fail.
+"""
+
+import math
+from collections.abc import Mapping
+from copy import copy
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_model import se2
+from push_model.arrays import Array
+from push_model.free_space import FreeSpace, Obstacles
+from push_model.jobs import JobError
+from push_model.object_way import NoObjectWay
+from push_model.occupancy import OccupancyGrid
+from push_model.specs import ObjectSpec, RobotSpec
+from swarm_push.arrival import pose_errors
+from swarm_push.object_track import ObjectTrack
+from swarm_push.rim_capacity import RimCapacity
+
+_SAMPLES = 5  # headings between start and target at which a motion is looked at
+_LATTICE = 0.05  # [m] of places that robots can go to
+_SPARE = 0.01  # [m] that ways of robots keep from walls
+_NEAR = 0.2  # [m] from a robot within which it joins the lattice
+_PACE = 0.7  # mean speed of a push over the robots' greatest speed, as measured
+_AMPLE = 1.8  # force at best over what is needed above which swarms moved objects, as measured
+_GATHER = 1.5  # ways of robots round each other and the object over straight ones, likewise
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """What is known of a target beforehand.
+
+    code, reason: why it is refused; NONE and empty where it is accepted. robots: how many of those
+    seen can get to the object; needed: how many it takes at least, None where no number will do.
+    force: [N] that the motion takes, its torque divided by the limit surface's radius; available:
+    [N] that these robots can make at best. way: [m] of the object, turns by its greatest radius.
+    seconds: that the job takes, roughly.
+    """
+
+    code: JobError
+    reason: str
+    robots: int
+    needed: int | None
+    force: float
+    available: float
+    way: float
+    seconds: float
+
+    @property
+    def accepted(self) -> bool:
+        """Whether nothing is known against it."""
+        return self.code is JobError.NONE
+
+    @property
+    def margin(self) -> float:
+        """[N] of force that the robots have to spare at best; negative: that they lack."""
+        return self.available - self.force
+
+
+@dataclass(frozen=True)
+class Strength:
+    """force: [N] that a motion takes; available: [N] that the robots can make of it at best;
+    too_heavy: why they cannot, None where they may."""
+
+    force: float
+    available: float
+    too_heavy: str | None
+
+    @property
+    def thin(self) -> bool:
+        """Whether robots that are not placed as well as can be may fail to move the object."""
+        return self.available < _AMPLE * self.force
+
+    def __str__(self) -> str:
+        return _forces(self.force, self.available)
+
+
+class Feasibility:
+    """For one object, robots of one type and one map, or an open room without one."""
+
+    def __init__(
+        self,
+        item: ObjectSpec,
+        robot: RobotSpec,
+        grid: OccupancyGrid | None = None,
+        track: ObjectTrack | None = None,
+    ) -> None:
+        """track: the planner of the object's way on the map; it is left as it is."""
+        self.capacity = RimCapacity(item, robot)
+        self._radius, self._speed = robot.footprint_radius, robot.max_speed
+        self._lever = float(np.hypot(*item.geometry.outline.T).max())
+        self._grid, self._track = grid, track
+        self._space: FreeSpace | None = None
+
+    def assess(self, target: Array, pose: Array, robots: Mapping[str, Array]) -> Assessment:
+        """Of a target ``(3,)``, its heading nan where any will do, for an object at a pose
+        ``(3,)``, both of the centre of mass, and robots at poses ``(3,)`` by name."""
+        able = self._able(pose, robots)
+        way, aim = self._straight(pose, target), target
+        refusal, least = self._no_place(target), least_contacts(target)
+        if refusal is None and self._track is not None:
+            track = copy(self._track)  # so that the way that is under way stays
+            try:
+                track.plan(pose, target, np.zeros((0, 3)))
+                way, (aim, _) = track.left(pose), track.aim(pose)
+            except NoObjectWay as error:
+                refusal = JobError.PLANNING_FAILED, str(error)
+        twists = self._twists(pose, aim)
+        needed = self._needed(twists, least)
+        force = max((self.capacity.needed_force(t) for t in twists), default=0.0)
+        available = self._available(twists, len(able))
+        if refusal is None:
+            refusal = self._too_few(force, available, twists, least, len(able), len(robots))
+        code, reason = refusal or (JobError.NONE, "")
+        seconds = self._gathering(pose, able) + way / (_PACE * self._speed)
+        return Assessment(code, reason, len(able), needed, force, available, way, seconds)
+
+    def strength(self, pose: Array, target: Array, robots: int) -> Strength:
+        """Of so many robots that move an object at a pose ``(3,)`` on straight towards a target
+        ``(3,)``."""
+        twists = self._twists(pose, target)[:1]
+        force = max((self.capacity.needed_force(t) for t in twists), default=0.0)
+        available = self._available(twists, robots)
+        if available >= force:
+            return Strength(force, available, None)
+        text = self._heavy(twists, force, available, least_contacts(target))
+        return Strength(force, available, text)
+
+    def _needed(self, twists: list[Array], least: int) -> int | None:
+        """The fewest robots that may do for all of some twists ``(3,)`` in the object's frame; None
+        where no number of them does."""
+        counts = [self.capacity.least_robots(t) for t in twists]
+        if not counts or None in counts:
+            return None if counts else 0
+        return max(least, *(c for c in counts if c is not None))
+
+    def _too_few(
+        self,
+        force: float,
+        available: float,
+        twists: list[Array],
+        least: int,
+        able: int,
+        seen: int,
+    ) -> tuple[JobError, str] | None:
+        if not twists:
+            return None
+        if not able:
+            text = f"none of {seen} robots can get to the object" if seen else "no robot is seen"
+            return JobError.POSITIONING_FAILED, text
+        if available < force:
+            return JobError.TOO_HEAVY, self._heavy(twists, force, available, least)
+        return (JobError.POSITIONING_FAILED, too_few(able, least)) if able < least else None
+
+    def _heavy(self, twists: list[Array], force: float, available: float, least: int) -> str:
+        """The refusal, with its numbers."""
+        text = f"too heavy: {_forces(force, available)}"
+        needed = self._needed(twists, least)
+        if needed is None:
+            return f"{text}, and no more robots find room where it is pushed from"
+        return f"{text}; at least {counted(needed)} are needed"
+
+    def _available(self, twists: list[Array], robots: int) -> float:
+        """[N] for the twist for which least is available of what it takes."""
+        parts = [
+            (self.capacity.available_force(t, robots), self.capacity.needed_force(t))
+            for t in twists
+        ]
+        if not parts:
+            return 0.0
+        part = min(a / f for a, f in parts)
+        return part * max(f for _, f in parts)
+
+    def _twists(self, pose: Array, target: Array) -> list[Array]:
+        """In the object's frame, as it goes straight and turns as it goes; none where it is there.
+        That of the beginning alone where any heading will do: it may turn on its way."""
+        away, turned = pose_errors(pose, target)
+        if away + self._lever * turned < 1e-6:
+            return []
+        way = target[:2] - pose[:2]
+        turn = 0.0 if math.isnan(target[2]) else se2.wrap(float(target[2] - pose[2]))
+        parts = [0.0] if turn == 0.0 else np.linspace(0.0, 1.0, _SAMPLES).tolist()
+        return [np.array([*(se2.rotation_matrix(pose[2] + p * turn).T @ way), turn]) for p in parts]
+
+    def _straight(self, pose: Array, target: Array) -> float:
+        away, turned = pose_errors(pose, target)
+        return away + self._lever * turned
+
+    def _no_place(self, target: Array) -> tuple[JobError, str] | None:
+        grid, track = self._grid, self._track
+        if grid is not None and not grid.contains(float(target[0]), float(target[1])):
+            return JobError.OUTSIDE_MAP, "the target is outside the map"
+        if track is not None and not track.fits(target):
+            return JobError.GOAL_OCCUPIED, "the object does not fit at the target"
+        return None
+
+    def _able(self, pose: Array, robots: Mapping[str, Array]) -> list[Array]:
+        """Places ``(2,)`` of the robots that can get to the object."""
+        points = [p[:2] for p in robots.values()]
+        if self._grid is None or not points:
+            return points
+        if self._space is None:
+            self._space = FreeSpace(self._grid, _LATTICE)
+        space, among = self._space, Obstacles()
+        reach = space.from_here(pose[:2], self._radius + _SPARE, among)
+        places = space.places[np.isfinite(reach.lengths)]
+        if not len(places):
+            return []
+        found = []
+        for point in points:
+            away = np.hypot(*(places - point).T)
+            near = np.argsort(away, kind="stable")[:8]
+            near = near[away[near] < _NEAR]
+            if any(space.line_keeps(point, places[k], self._radius, among) for k in near):
+                found.append(point)
+        return found
+
+    def _gathering(self, pose: Array, points: list[Array]) -> float:
+        """[s] until most robots are at the object, roughly."""
+        if not points:
+            return 0.0
+        away = np.hypot(*(np.array(points) - pose[:2]).T) - self._lever
+        way = max(0.0, float(np.median(away))) + 0.5 * math.pi * self._lever
+        return _GATHER * way / self._speed
+
+
+def counted(robots: int) -> str:
+    """So many robots, in words."""
+    return "1 robot" if robots == 1 else f"{robots} robots"
+
+
+def least_contacts(target: Array) -> int:
+    """How many robots a target ``(3,)`` takes whatever the object weighs. What is left to do at a
+    pose is a turn on the spot, which takes a couple: two forces. A position takes one."""
+    return 1 if math.isnan(target[2]) else 2
+
+
+def _forces(force: float, available: float) -> str:
+    """As a traction check of one robot says it; never as much as is needed by rounding."""
+    return f"needs {force:.2f} N, has {math.floor(100.0 * available) / 100.0:.2f} N at best"
+
+
+def too_few(robots: int, least: int) -> str:
+    """Why fewer robots than contacts that a target takes will not do."""
+    return (
+        f"{counted(robots)} cannot turn the object to a heading: that takes a couple of forces, "
+        f"so at least {least} robots; for a position without a heading one will do"
+    )
