@@ -14,6 +14,8 @@ from push_estimation.pose_gate import PoseGateSettings
 from push_model.settings import SettingsError, from_mapping
 from push_mpc.controllers import controller_kind
 from push_mpc.settings import ControllerSettings, MpcSettings, TrackerSettings
+from push_mpc.torque_friction import FrictionTrustSettings
+from push_mpc.torque_observer import TorqueObserverSettings
 from push_mpc.torque_tracker import TorqueTrackerSettings
 from push_mpc.wheel_slip_nmpc import WheelSlipSettings
 from push_planner import PlannerSettings
@@ -62,6 +64,8 @@ SECTIONS: dict[str, dict[str, type[Any]]] = {
     "torque_controller": {
         "nmpc": WheelSlipSettings,
         "tracker": TorqueTrackerSettings,
+        "observer": TorqueObserverSettings,
+        "friction": FrictionTrustSettings,
         "poses": PoseGateSettings,
     },
 }
