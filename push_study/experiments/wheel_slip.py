@@ -53,14 +53,17 @@ OVERRATED = 0.7
 """Friction of the wheels that is believed in case III."""
 START = np.array([0.0, -3.0, 0.0])
 """Where the trajectory begins."""
-WAY = (
+START_STRAIGHT, BENDS, END_BEND, END_STRAIGHT = (
     (3.2, 0.0),
-    *((1.7, 0.8), (0.8, -0.8)) * 3,
+    ((1.7, 0.8), (0.8, -0.8)),
     (1.0, 0.8),
     (0.8, 0.0),
 )
-"""Length [m] and curvature [1/m] of its portions. The box stays at the bumper up to a curvature of
-contact friction / (distance of its centre ahead of the axle) = 0.3 / 0.375 m = 0.8 / m."""
+"""Length [m] and curvature [1/m] of the way's portions; the bends come several times. The box stays
+at the bumper up to a curvature of contact friction / (distance of its centre ahead of the axle)
+= 0.3 / 0.375 m = 0.8 / m."""
+PAIRS = 3
+"""Times that the bends come."""
 SPEED, ACCELERATION = 0.8, 0.8
 _EARLIER = 0.5
 """[s] before the first bend from which on slip and error count."""
@@ -70,7 +73,8 @@ _SPACING = 0.01  # [m]
 
 @dataclass(frozen=True)
 class SlipTask:
-    """One run. case: 1, 2, 3; constraint: (2.31)-(2.33); digest: of the scenario's text."""
+    """One run. case: 1, 2, 3; constraint: (2.31)-(2.33); digest: of the scenario's text; pairs: of
+    bends."""
 
     scenario: str
     seed: int
@@ -79,6 +83,7 @@ class SlipTask:
     constraint: bool
     uncertainty: str = "mild"
     digest: str = ""
+    pairs: int = PAIRS
 
     @property
     def trace_file(self) -> Path:
@@ -87,10 +92,11 @@ class SlipTask:
         return Path(self.out) / f"trace-{self.case}-{kind}-{self.seed}.npz"
 
 
-def trajectory(drive: TorqueDrive) -> Trajectory:
+def trajectory(drive: TorqueDrive, pairs: int = PAIRS) -> Trajectory:
     """Straight and round portions from ``START``, rest to rest."""
-    points, headings, curvatures = [START[:2]], [float(START[2])], [WAY[0][1]]
-    for length, curvature in WAY:
+    portions = (START_STRAIGHT, *BENDS * pairs, END_BEND, END_STRAIGHT)
+    points, headings, curvatures = [START[:2]], [float(START[2])], [portions[0][1]]
+    for length, curvature in portions:
         for _ in range(round(length / _SPACING)):
             heading = headings[-1] + _SPACING * curvature
             middle = 0.5 * (headings[-1] + heading)
@@ -104,7 +110,7 @@ def trajectory(drive: TorqueDrive) -> Trajectory:
 
 def settled() -> float:
     """[s] of the trajectory from which on slip and error count: just before its first bend."""
-    return WAY[0][0] / SPEED + 0.5 * SPEED / ACCELERATION - _EARLIER
+    return START_STRAIGHT[0] / SPEED + 0.5 * SPEED / ACCELERATION - _EARLIER
 
 
 def tasks(options: StudyOptions) -> list[SlipTask]:
@@ -154,7 +160,7 @@ def world_of(task: SlipTask) -> tuple[Scenario, Scenario, Trajectory, Row]:
         tracker__pose_delay=delay,
     )
     world = replace(world, parameters=believed.parameters)
-    return believed, world, trajectory(drive), drawn
+    return believed, world, trajectory(drive, task.pairs), drawn
 
 
 class Watcher(Node):

@@ -195,14 +195,12 @@ def test_a_cancel_at_full_speed_skids_no_wheel(run):
     assert run.stands() and run.x - begin < 0.3
 
 
-def compare(tmp_path, case, seeds, uncertainty="mild"):
+def compare(tmp_path, case, seeds, **changes):
     """Slip kept and error ratio, with the constraint over without it, after settling."""
     rows = {
         constraint: [
             wheel_slip.trial(
-                wheel_slip.SlipTask(
-                    "wheel-slip", seed, str(tmp_path), case, constraint, uncertainty
-                )
+                wheel_slip.SlipTask("wheel-slip", seed, str(tmp_path), case, constraint, **changes)
             )
             for seed in seeds
         ]
@@ -225,13 +223,13 @@ def compare(tmp_path, case, seeds, uncertainty="mild"):
 
 def test_the_constraint_takes_the_slip_of_the_bends_away(tmp_path, capsys):
     """Case II, with the noise, the latency and the frictions of ``mild``."""
-    kept, ratio, _, rows = compare(tmp_path, 2, [2])
+    kept, ratio, _, rows = compare(tmp_path, 2, [4], pairs=2)
     assert kept < 0.2 and ratio < 1.2, (kept, ratio)
     (without,) = rows[False]
     assert without["slip_rms_m_s"] > 0.02 and without["slip_max_m_s"] > 0.3  # the bends provoke it
     assert without["box_floor_friction"] != 0.3 and without["settled_from_s"] == pytest.approx(4.0)
-    options = StudyOptions(("wheel-slip",), 1, 2, tmp_path)
-    tasks = wheel_slip.tasks(options)
+    options = StudyOptions(("wheel-slip",), 1, 4, tmp_path)
+    tasks = [replace(t, pairs=2) for t in wheel_slip.tasks(options)]
     wheel_slip.conclude(options, tasks, rows[True] + rows[False])
     assert (tmp_path / "wheel-slip.png").stat().st_size > 5000
     assert "from 4.0 s on, before the first bend; uncertainty: mild" in capsys.readouterr().out
