@@ -132,12 +132,11 @@ def trial(task: LineTask) -> Row:
         return _track(task)
 
 
-def _track(task: LineTask) -> Row:
+def world_of(task: LineTask) -> tuple[Scenario, Scenario, Row]:
+    """What the controller believes, with its settings; the world; what was drawn for it."""
     variant = VARIANTS[task.variant]
-    scenario = load_scenario(task.scenario)
-    way = line(next(iter(scenario.robots.values()))[1], task.length, SPEED, ACCELERATION)
-    level = uncertainty(task.uncertainty)
-    believed, world, drawn = level.draw(aside(scenario, task.offset), task.seed)
+    scenario = aside(load_scenario(task.scenario), task.offset)
+    believed, world, drawn = uncertainty(task.uncertainty).draw(scenario, task.seed)
     believed = believed.settings(
         "controller",
         controller=variant.controller,
@@ -147,6 +146,18 @@ def _track(task: LineTask) -> Row:
     )
     if variant.controller == "contact_force":
         believed = believed.settings("controller", mpc__constraint=variant.constraint)
+    return believed, world, drawn
+
+
+def _track(task: LineTask) -> Row:
+    variant = VARIANTS[task.variant]
+    believed, world, drawn = world_of(task)
+    way = line(
+        next(iter(load_scenario(task.scenario).robots.values()))[1],
+        task.length,
+        SPEED,
+        ACCELERATION,
+    )
     with LockstepRun(believed, world=world, quiet=True) as run:
         run.start()
         result = _follow(run, believed, way)
