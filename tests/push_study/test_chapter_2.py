@@ -160,3 +160,34 @@ def test_goals_in_a_row_are_reached_without_a_reset(tmp_path, capsys):
     # A robot and its stand-off fit behind the box, wherever its side looks to.
     assert np.abs(goals[:, 0]).max() < 1.5 - 0.14 and np.abs(goals[:, 1]).max() < 1.0 - 0.14
     assert np.ptp(goals[:, 0]) > 2.3 and np.ptp(goals[:, 1]) > 1.3
+
+
+@pytest.mark.long
+def test_the_constraint_decides_whether_three_pushes_are_enough(tmp_path, capsys):
+    """With our gains. With (2.53) the object stays where it is at the bumper; without it slides."""
+    rows, tasks = {}, []
+    for variant in ("(2.53), our gains", "none, our gains"):
+        task = three_push.ThreePushTask("three-push", 1, str(tmp_path), variant)
+        rows[variant] = three_push.trial(task)
+        tasks.append(task)
+    held, lost = rows.values()
+    assert held["success"] and held["offset_m"] == lost["offset_m"] == pytest.approx(0.06)
+    assert held["pushes"] == 3 and held["replans"] == held["contact_losses"] == 0, held
+    assert held["position_error_m"] < 0.04 and held["orientation_error_rad"] < np.deg2rad(1.8)
+    assert held["slid_m"] < 0.005, held
+    assert lost["slid_m"] > 0.015 and lost["pushes"] > 3 and lost["replans"] > 0, lost
+    three_push.conclude(StudyOptions(("three-push",), 1, 1, tmp_path), tasks, [held, lost])
+    assert (tmp_path / "three-push.png").stat().st_size > 5000
+    assert "1/1" in capsys.readouterr().out
+
+
+def test_what_slides_along_the_bumper_is_measured_in_pushes_only():
+    """An object that is driven round slides nowhere; one that moves aside while it moves does."""
+    along = np.linspace(0.0, 0.5, 60)
+    robot = np.column_stack([along, 0 * along, 0 * along])
+    pushed = robot + [0.1, 0.0, 0.0]
+    assert three_push.slid(robot, pushed) < 1e-12
+    sliding = pushed + np.column_stack([0 * along, 0.04 * along, 0 * along])
+    assert three_push.slid(robot, sliding) == pytest.approx(0.02, abs=1e-3)
+    standing = np.repeat(pushed[:1], 60, axis=0)  # the robot drives, the object does not
+    assert three_push.slid(robot, standing) == 0.0
