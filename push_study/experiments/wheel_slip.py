@@ -9,6 +9,7 @@ wheels, and that would hide what follows. From one bend into the next the turn r
 for jumps by 1.28 rad/s, which no traction can follow.
 """
 
+import math
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -248,7 +249,7 @@ def _follow(task: SlipTask) -> Row:
         sent = watcher.client.send_goal_async(goal)
         spinner.until(sent.done, 20.0)
         begin, answer = bridge.time, sent.result().get_result_async()
-        spinner.until(lambda: answer.done() or bridge.time > begin + _LIMIT, 600.0)
+        spinner.until(lambda: answer.done() or bridge.time > begin + _LIMIT, math.inf)
         result = answer.result().result if answer.done() else None
     time, poses, wheels = watcher.table()
     after = (time >= begin) & (time <= begin + way.duration)
