@@ -1,7 +1,8 @@
 """The wheel-slip NMPC (2.14) against IPOPT: solve time and cost of the solution.
 
-Both solve the same programmes from the same start: along a closed loop from the last solution, and
-from random states without one.
+Both solve the same programme from the same start: along a closed loop, with the last solution,
+and from random states, with none. Programmes with the slip constraint (2.31)-(2.33) and without it
+are timed, and bounded, apart. Times are CPU times of the thread.
 """
 
 import time
@@ -21,7 +22,9 @@ _SMOOTH, _NEWTON = 0.1, 0.1  # as in push_mpc/torque_prediction.py, written inde
 
 
 class Ipopt:
-    """(2.14) in casadi, with the greatest violation as a further unknown."""
+    """(2.14) in casadi, with the greatest violation as a further unknown.
+
+    Its friction is the one that the controller trusts when this is made."""
 
     def __init__(self, nmpc: WheelSlipNmpc) -> None:
         s, r = nmpc.settings, nmpc.robot
@@ -52,8 +55,8 @@ class Ipopt:
             loads = [0.5 * (both + apart), 0.5 * (both - apart)]
             if s.constraint:
                 for pull, load in zip(pulls, loads, strict=True):
-                    norm = ca.sqrt(pull**2 + aside**2 + _SMOOTH**2)
-                    rows += [_NEWTON * (norm - s.friction * load), -_NEWTON * load]
+                    norm = ca.sqrt(pull**2 + (s.sideways_share * aside) ** 2 + _SMOOTH**2)
+                    rows += [_NEWTON * (norm - nmpc.trusted * load), -_NEWTON * load]
                 rows.append(-_NEWTON * caster)
             x, y, theta, v, omega = (
                 x + s.step * ca.cos(theta) * v,
@@ -126,39 +129,33 @@ def run(count: int = 200) -> dict[str, Any]:
     spec = next(iter(load_scenario("pioneer").robots.values()))[0]
     result: dict[str, Any] = {}
     bounds: dict[str, Any] = {}
-    ours_all, ipopt_all, worse = [], [], []
     for name, constraint in (("with the constraint", True), ("without", False)):
         nmpc = WheelSlipNmpc(replace(WheelSlipSettings(), constraint=constraint), spec)
         rival = Ipopt(nmpc)
         nmpc.warm_up()
-        ours, theirs, ratio = [], [], []
-        for start in _starts(nmpc, count):
-            state, reference, z = start
+        ours, theirs, over = [], [], []
+        for state, reference, z in _starts(nmpc, count):
             nmpc.set_start(z)
             answer = nmpc.solve(state, reference)
             assert answer.solved, answer.reason
             _, cost, spent = rival.solve(z, state, reference)
             ours.append(answer.solve_time)
             theirs.append(spent)
-            ratio.append(answer.cost / cost - 1.0)
+            over.append(answer.cost / cost - 1.0)
+        late, slow = 1e3 * float(np.quantile(ours, 0.99)), 1e3 * float(np.quantile(theirs, 0.99))
+        ratio, worse = float(np.median(theirs) / np.median(ours)), float(np.quantile(over, 0.99))
         print(
-            f"  {name:20s} ours median {1e3 * np.median(ours):.2f} ms p99 "
-            f"{1e3 * np.quantile(ours, 0.99):.2f} ms; IPOPT median "
-            f"{1e3 * np.median(theirs):.2f} ms p99 {1e3 * np.quantile(theirs, 0.99):.2f} ms; "
-            "cost over IPOPT's: median "
-            f"{100 * np.median(ratio):.3f} %, 99 % {100 * np.quantile(ratio, 0.99):.3f} %, most "
-            f"{100 * np.max(ratio):.2f} %",
+            f"  {name:20s} ours median {1e3 * np.median(ours):.2f} ms p99 {late:.2f} ms; IPOPT "
+            f"median {1e3 * np.median(theirs):.2f} ms p99 {slow:.2f} ms; cost over IPOPT's: "
+            f"median {100 * np.median(over):.3f} %, 99 % {100 * worse:.3f} %, most "
+            f"{100 * np.max(over):.2f} %",
             flush=True,
         )
-        ours_all += ours
-        ipopt_all += theirs
-        worse += ratio
         result[name] = {"ours_s": float(np.median(ours)), "ipopt_s": float(np.median(theirs))}
-    bounds["a solve, p99 [ms]"] = at_most(1e3 * float(np.quantile(ours_all, 0.99)), 10.0)
-    bounds["IPOPT / ours, median"] = at_least(
-        float(np.median(ipopt_all) / np.median(ours_all)), 3.0
-    )
-    bounds["cost over IPOPT's, 99 % of the solves"] = at_most(float(np.quantile(worse, 0.99)), 0.01)
+        bounds[f"{name}: a solve, p99 [ms]"] = at_most(late, 10.0)
+        bounds[f"{name}: IPOPT / ours, median"] = at_least(ratio, 3.0)
+        bounds[f"{name}: IPOPT / ours, p99"] = at_least(slow / late, 3.0)
+        bounds[f"{name}: cost over IPOPT's, 99 % of the solves"] = at_most(worse, 0.01)
     result["bounds"] = bounds
     return result
 

@@ -17,6 +17,8 @@ from push_estimation.pose_gate import PoseGateSettings
 from push_job.method import MethodSpec, method_names, method_spec
 from push_model.settings import SettingsError
 from push_mpc.settings import ControllerSettings, MpcSettings, TrackerSettings
+from push_mpc.torque_friction import FrictionTrustSettings
+from push_mpc.torque_observer import TorqueObserverSettings
 from push_mpc.torque_tracker import TorqueTrackerSettings
 from push_mpc.wheel_slip_nmpc import WheelSlipSettings
 from push_planner import PlannerSettings
@@ -166,7 +168,13 @@ KINDS: dict[str, NodeKind] = {
         "TorqueControllerNode",
         _robot,
         ("robot",),
-        {"nmpc": WheelSlipSettings, "tracker": TorqueTrackerSettings, **_GATED},
+        {
+            "nmpc": WheelSlipSettings,
+            "tracker": TorqueTrackerSettings,
+            "observer": TorqueObserverSettings,
+            "friction": FrictionTrustSettings,
+            **_GATED,
+        },
         listens=1,
     ),
     "recorder": NodeKind(

@@ -12,6 +12,8 @@ constraint of 2.4.7, in [rad/s]: the rows of forces are divided by the limit sur
 """
 
 import time
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +24,15 @@ from push_mpc.ltv_mpc import LtvMpc
 from push_mpc.prediction import CHANGES, CURVATURES, OUTPUTS, SLACKS, WHEELS, tick_rows
 from push_mpc.settings import ContactForceSettings
 from push_qp import Qp, QpBackend
+
+PRINTED_GAINS: Mapping[str, Any] = {
+    "state_weight": (15.0, 20.0, 5.0, 1.0, 1.0),
+    "terminal_factor": 50.0,
+    "input_weight": (0.1, 0.1),
+    "force_weight": 0.001,
+    "input_rate_weight": (0.1, 0.1),
+}
+"""Q, P = 50 Q, R_u and R_du of section 2.4.6, which are of a Pioneer; ours are the defaults."""
 
 FORCES = 4
 """f_1R, f_1L, f_2R, f_2L of (2.39)."""

@@ -17,14 +17,16 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from push_estimation.pose_gate import PoseGateSettings, Stamp
-from push_model.arrays import Array
 from push_model.settings import SettingsError
+from push_mpc.torque_friction import FrictionTrustSettings
+from push_mpc.torque_observer import TorqueObserverSettings
 from push_mpc.torque_tracker import TorqueTick, TorqueTracker, TorqueTrackerSettings
+from push_mpc.torque_wheels import WheelFeed
 from push_mpc.wheel_slip_nmpc import WheelSlipNmpc, WheelSlipSettings
 from push_msgs.action import FollowTrajectory
 from push_msgs.msg import ControllerStatus, WheelTorques
 from push_ros.actions import GoalServer
-from push_ros.conversions import trajectory_from_ros, twist_to_ros
+from push_ros.conversions import time_from_ros, trajectory_from_ros, twist_to_ros
 from push_ros.diagnostics import Diagnostics
 from push_ros.heartbeat import HeartbeatWatch
 from push_ros.names import inside, names_of_robot
@@ -54,7 +56,9 @@ class TorqueControllerNode(Node):
         self.robot, spec = self._scenario.robot(robot)
         names = names_of_robot(self, self.robot)
         values = dict(self._scenario.parameters.get("torque_controller", {}))
-        sections = {k: values.pop(k, {}) for k in ("nmpc", "tracker", "poses")}
+        sections = {
+            k: values.pop(k, {}) for k in ("nmpc", "tracker", "observer", "friction", "poses")
+        }
         if values:
             raise SettingsError(f"torque_controller: unknown key '{next(iter(values))}'")
 
@@ -64,9 +68,14 @@ class TorqueControllerNode(Node):
 
         nmpc = WheelSlipNmpc(declared(WheelSlipSettings, "nmpc"), spec)
         nmpc.warm_up()
-        self.tracker = TorqueTracker(declared(TorqueTrackerSettings, "tracker"), nmpc)
+        self.tracker = TorqueTracker(
+            declared(TorqueTrackerSettings, "tracker"),
+            nmpc,
+            declared(TorqueObserverSettings, "observer"),
+            declared(FrictionTrustSettings, "friction"),
+        )
         self._held = 0.0  # [s] without a pose of the robot
-        self._wheels: Array | None = None  # [rad/s] left, right
+        self._wheels = WheelFeed()
         self._ticks = 0
         self._last_stamp = Header().stamp
         self._mode, self._reason = ControllerStatus.IDLE, "no task"
@@ -125,8 +134,7 @@ class TorqueControllerNode(Node):
             self._end(FollowTrajectory.Result.PREEMPTED, "a new trajectory replaces this one")
 
     def _canceled(self) -> None:
-        self._end(FollowTrajectory.Result.CANCELED, "canceled")
-        self._publish(None)
+        self._end(FollowTrajectory.Result.CANCELED, "canceled")  # it brakes from the next frame on
 
     def _end(self, code: int, message: str, tick: TorqueTick | None = None) -> None:
         self.tracker.stop()
@@ -154,7 +162,8 @@ class TorqueControllerNode(Node):
             self._wait(dt, pose)
             return
         self._held, self._ticks = 0.0, self._ticks + 1
-        tick = self.tracker.tick(dt, pose, self._wheels)
+        wheels = self._wheels.at(time_from_ros(frame.stamp))
+        tick = self.tracker.tick(dt, pose, wheels)
         self._publish(tick.torques)
         failed = tick.solve is not None and not tick.solve.solved
         self._mode = ControllerStatus.FALLBACK if failed else ControllerStatus.MOVE
@@ -167,17 +176,18 @@ class TorqueControllerNode(Node):
             self._server.feedback(FollowTrajectory.Feedback(progress=tick.progress))
 
     def _on_wheels(self, message: JointState) -> None:
-        """Two speeds, left and right; others say nothing."""
-        speeds = np.array(message.velocity, dtype=np.float64)
-        if speeds.shape != (2,) or not np.isfinite(speeds).all():
-            self._diagnostics.refuse("joint_states", f"{len(speeds)} speeds, or not finite ones")
-            return
-        self._wheels = speeds
+        """Two wheels, left and right; others say nothing."""
+        why = self._wheels.take(
+            time_from_ros(message.header.stamp),
+            np.array(message.position, dtype=np.float64),
+            np.array(message.velocity, dtype=np.float64),
+        )
+        if why:
+            self._diagnostics.refuse("joint_states", why)
 
     def _wait(self, dt: float, pose: Any) -> None:
         """Stand; a trajectory waits for a pose, but not for ever."""
-        self.tracker.rest(dt, pose)
-        self._publish(None)
+        self._publish(self.tracker.rest(dt, pose))
         if self.tracker.active:
             self._mode, self._reason = ControllerStatus.HOLD, f"no valid pose of {self.robot}"
             self._held += dt
@@ -205,8 +215,8 @@ class TorqueControllerNode(Node):
             failures=tracker.failures,
             curvature_margin=math.inf,
             obstacle_margin=math.inf,
-            v=tracker.speed.v,
-            omega=tracker.speed.omega,
+            v=tracker.observer.v,
+            omega=tracker.observer.omega,
         )
         message.header.stamp = self._last_stamp
         message.header.frame_id = FRAME
@@ -226,7 +236,6 @@ class TorqueControllerNode(Node):
             return
         if silence < 2.0 * self._poses.gate.settings.timeout:
             return
-        self.tracker.rest(0.0, None)
         self._publish(None)
         if silence > self.tracker.settings.give_up:
             self._end(FollowTrajectory.Result.POSES_STALE, f"no poses for {silence:.1f} s")

@@ -31,9 +31,11 @@ def predict(
     reference: Any,
     step: float,
     robot: Any,
+    load: Any,
     weight: Any,
     terminal: Any,
     friction: float,
+    share: float,
     limits: Any,
     price: Any,
     H: Any,
@@ -50,12 +52,14 @@ def predict(
     z: ``(2 M,)`` [Nm]. state: ``(5,)`` x, y, theta, v, omega. reference: ``(N + 1, 5)``, its
     headings continuous and of the turn that the state's is in.
     robot: the fields of ``TorqueRobot`` in their order, and g. weight, terminal: ``(5,)``.
+    load: ``(2,)`` [N], [Nm], as of ``TorqueRobot``: what the robot meets, over the whole horizon.
     price: ``(N, 2)`` multipliers of the slip rows, whose curvature H takes in, too: without it a
     step along an active slip row is far too long. friction: mu; no slip rows where it is not
-    positive. limits: [m], [m], [rad/s].
+    positive. share: of the sideways traction that either wheel bears. limits: [m], [m], [rad/s].
     """
     n, steps = z.shape[0], reference.shape[0] - 1
-    r, lever, body, wheel, ahead, height, turning, rolling, caster, gravity = robot
+    r, lever, body, wheel, ahead, height, turning, rolling, caster, met, gravity = robot
+    drag, moment = load
     mass = body + 2.0 * wheel
     along_mass = mass + 2.0 * rolling / r**2
     about = turning + 2.0 * lever**2 / r**2 * rolling
@@ -71,8 +75,8 @@ def predict(
     for k in range(steps):
         j = 2 * min(k, n // 2 - 1)
         right, left = z[j], z[j + 1]
-        a = ((right + left) / r + lag * omega * omega) / along_mass
-        eps = (lever / r * (right - left) - lag * v * omega) / about
+        a = ((right + left) / r + lag * omega * omega - drag) / along_mass
+        eps = (lever / r * (right - left) - lag * v * omega + moment) / about
         for i in range(n):
             ir, il = (1.0 if i == j else 0.0), (1.0 if i == j + 1 else 0.0)
             da[i] = ((ir + il) / r + 2.0 * lag * omega * do[i]) / along_mass
@@ -80,8 +84,9 @@ def predict(
         spin = rolling / r
         f_right = (right - spin * (a + lever * eps)) / r
         f_left = (left - spin * (a - lever * eps)) / r
-        aside = mass * v * omega + lag * eps
+        aside = share * (mass * v * omega + lag * eps)
         held = body * (ahead * gravity - height * (a - ahead * omega * omega)) - roll * a
+        held -= met * drag
         n_caster = held / caster
         tilt = body * height * (v * omega + ahead * eps) + 2.0 * wheel * r * v * omega
         both, apart = mass * gravity - n_caster, tilt / lever
@@ -109,7 +114,7 @@ def predict(
             df_right = (ir - spin * (da[i] + lever * de[i])) / r
             df_left = (il - spin * (da[i] - lever * de[i])) / r
             vo = v * do[i] + omega * dv[i]
-            d_aside = mass * vo + lag * de[i]
+            d_aside = share * (mass * vo + lag * de[i])
             d_held = -body * height * (da[i] - 2.0 * ahead * omega * do[i]) - roll * da[i]
             d_caster = d_held / caster
             d_tilt = body * height * (vo + ahead * de[i]) + 2.0 * wheel * r * vo

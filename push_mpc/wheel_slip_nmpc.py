@@ -16,16 +16,9 @@ from push_model.drives import TorqueDrive
 from push_model.limit_surface import GRAVITY
 from push_model.settings import SettingsError, bounded, settings
 from push_model.specs import RobotSpec
-from push_model.torque_robot import TorqueRobot
+from push_model.torque_robot import NO_LOAD, Load, TorqueRobot
 from push_mpc.torque_prediction import CUTS, ROWS, predict
-from push_qp import Qp
-from push_qp.active_set import ActiveSetBackend
-from push_qp.programme import Index
-
-_DAMPING = 1e-6  # of the Hessian's diagonal: without weights on torques it may be singular
-_SHORTEST = 1.0 / 64.0  # step of a line search
-_ARMIJO = 1e-4
-_ACTIVE = 1e-7  # of what is left of a row that holds with equality
+from push_mpc.torque_sqp import SOLVED, WORDS, minimise, worst
 
 
 @settings
@@ -39,13 +32,19 @@ class WheelSlipSettings:
     terminal_factor: float = bounded(4.0, low=0.0, high=1000.0, doc="P = factor * Q")
     friction: float = bounded(0.5, low=0.01, high=3.0, doc="mu of the wheels that is believed")
     friction_trust: float = bounded(
-        0.85, low=0.1, high=1.0, doc="fraction of that friction that wheels may ask for"
+        0.9, low=0.1, high=1.0, doc="fraction of that friction that wheels may ask for"
+    )
+    sideways_share: float = bounded(
+        0.5,
+        low=0.5,
+        high=1.0,
+        doc="of the sideways traction of both wheels that either is taken to bear; 1: as printed",
     )
     constraint: bool = bounded(True, doc="whether (2.31)-(2.33) are asked for")
     position_limit: float = bounded(10.0, low=0.1, high=1e4, doc="[m] x_lim, y_lim")
     penalty: float = bounded(100.0, low=0.1, high=1e6, doc="rho of the greatest violation")
     penalty_square: float = bounded(1000.0, low=1e-3, high=1e8, doc="rho_2 of its square")
-    iterations: int = bounded(40, low=1, high=200, doc="quadratic programmes of a solve at most")
+    iterations: int = bounded(100, low=1, high=1000, doc="quadratic programmes of a solve at most")
     tolerance: float = bounded(1e-3, low=1e-8, high=1.0, doc="[Nm] of the last step")
 
     def __post_init__(self) -> None:
@@ -108,14 +107,12 @@ class WheelSlipNmpc:
         self._c, self._G = np.zeros(rows), np.zeros((rows, n))
         self.trusted = s.friction_trust * s.friction
         self._price = np.zeros((s.horizon, 2))
-        self._solver = ActiveSetBackend()
+        self._active, self._multiplier = np.zeros(n + 1, dtype=np.int64), np.zeros(n + 1)
         self.reset()
 
     def reset(self) -> None:
         """Forget the previous solution."""
-        self._z = np.zeros(2 * self.settings.control_horizon)
-        self._price[:] = 0.0
-        self._solver.reset()
+        self.set_start(np.zeros(2 * self.settings.control_horizon))
 
     @property
     def start(self) -> Array:
@@ -126,7 +123,7 @@ class WheelSlipNmpc:
         """Begin the next solve with torques ``(2 M,)``."""
         self._z = z.copy()
         self._price[:] = 0.0
-        self._solver.reset()
+        self._guessed = 0
 
     def warm_up(self) -> None:
         """Compile and solve once, so that the first command does not wait."""
@@ -135,7 +132,9 @@ class WheelSlipNmpc:
         self.solve(np.zeros(5), ahead)
         self.reset()
 
-    def evaluate(self, z: Array, state: Array, reference: Array) -> tuple[float, float]:
+    def evaluate(
+        self, z: Array, state: Array, reference: Array, load: Load = NO_LOAD
+    ) -> tuple[float, float]:
         """Cost (2.15) and greatest violation at torques ``(2 M,)``; fills in slopes."""
         s = self.settings
         cost = predict(
@@ -144,9 +143,11 @@ class WheelSlipNmpc:
             reference,
             s.step,
             self._fields,
+            load,
             self._Q,
             self._P,
             self.trusted if s.constraint else -1.0,
+            s.sideways_share,
             self._limits,
             self._price,
             self._H,
@@ -154,86 +155,57 @@ class WheelSlipNmpc:
             self._c,
             self._G,
         )
-        return float(cost), max(0.0, float(self._c[: ROWS * s.horizon].max()))
+        return float(cost), float(worst(self._c, ROWS * s.horizon))
 
     def merit(self, cost: float, violation: float) -> float:
         """What is minimised: the cost and the price of the greatest violation."""
         s = self.settings
         return cost + s.penalty * violation + s.penalty_square * violation**2
 
-    def solve(self, state: Array, reference: Array) -> NmpcResult:
+    def solve(self, state: Array, reference: Array, load: Load = NO_LOAD) -> NmpcResult:
         """One step.
 
         Parameters
         ----------
         state: ``(5,)`` x, y, theta, v, omega. reference: ``(N + 1, 5)`` of the same, first now.
+        load: drag [N] and moment [Nm] of what the robot pushes, see ``push_model.torque_robot``.
         """
         started = time.thread_time()
         s = self.settings
-        if not math.isfinite(float(state.sum() + reference.sum())):
+        if not math.isfinite(float(state.sum() + reference.sum() + sum(load))):
             return self._failed("input is not finite", started)
-        reference = beside(state, reference)
-        z, most = self._z.copy(), self.drive.max_torque
-        cost, violation = self.evaluate(z, state, reference)
-        value, count = self.merit(cost, violation), 0
-        for _ in range(s.iterations):
-            count += 1
-            qp, numbers = self._quadratic(z, most)
-            answer = self._solver.solve(qp)
-            if not answer.solved:
-                return self._failed(answer.status, started)
-            self._weigh(qp, numbers, answer.z)
-            d, slack = answer.z[:-1], float(answer.z[-1])
-            if float(np.abs(d).max()) < s.tolerance:
-                break
-            curve = float(self._g @ d) + self.merit(0.0, slack) - self.merit(0.0, violation)
-            part = 1.0
-            while True:
-                trial = z + part * d
-                cost, violation = self.evaluate(trial, state, reference)
-                after = self.merit(cost, violation)
-                if after <= value + _ARMIJO * part * min(curve, 0.0) or part < _SHORTEST:
-                    break
-                part *= 0.5
-            if after > value:  # no way down: as good as it gets
-                cost, violation = self.evaluate(z, state, reference)
-                break
-            z, value = trial, after
+        z = self._z.copy()
+        status, count, self._guessed, value, violation = minimise(
+            z,
+            state,
+            beside(state, reference),
+            s.step,
+            self._fields,
+            load,
+            self._Q,
+            self._P,
+            self.trusted if s.constraint else -1.0,
+            s.sideways_share,
+            self._limits,
+            self.drive.max_torque,
+            s.penalty,
+            s.penalty_square,
+            s.tolerance,
+            s.iterations,
+            self._price,
+            self._active,
+            self._multiplier,
+            self._guessed,
+            self._H,
+            self._g,
+            self._c,
+            self._G,
+        )
+        if status != SOLVED or not (math.isfinite(value) and np.isfinite(z).all()):
+            return self._failed(WORDS[status] if status != SOLVED else "not finite", started)
         self._z = z
         cpu = time.thread_time() - started
         return NmpcResult((float(z[0]), float(z[1])), True, value, violation, count, cpu, "")
-
-    def _quadratic(self, z: Array, most: float) -> tuple[Qp, Index]:
-        """The step d from torques z, and the greatest violation s after it; numbers of its rows."""
-        settings, n = self.settings, len(z)
-        H = np.zeros((n + 1, n + 1))
-        H[:n, :n] = self._H
-        H[range(n), range(n)] += _DAMPING * max(1.0, float(self._H.diagonal().max()))
-        H[n, n] = 2.0 * settings.penalty_square
-        f = np.append(self._g, settings.penalty)
-        near = np.flatnonzero(self._c > -self._reach(most))
-        G = np.hstack([self._G[near], np.full((len(near), 1), -1.0)])
-        low, high = np.append(-most - z, 0.0), np.append(most - z, 1e6)
-        return Qp.dense(H, f, G, -self._c[near], low, high), near
-
-    def _weigh(self, qp: Qp, numbers: Index, solution: Array) -> None:
-        """Multipliers of the slip rows, from what the others leave of the gradient."""
-        G, b = qp.normal[0].T, qp.bound[0]
-        held = np.flatnonzero(b - G @ solution < _ACTIVE)
-        free = (solution - qp.low > _ACTIVE) & (qp.high - solution > _ACTIVE)
-        self._price[:] = 0.0
-        if not len(held):
-            return
-        left = -(qp.H @ solution + qp.f)[free]
-        multipliers = np.linalg.lstsq(G[held][:, free].T, left, rcond=None)[0]
-        for number, value in zip(numbers[held], multipliers, strict=True):
-            step, row = divmod(int(number), ROWS)
-            if step < len(self._price) and row < 2:
-                self._price[step, row] = max(0.0, float(value))
-
-    def _reach(self, most: float) -> float:
-        """By how much a step may change a constraint, generously: others need no row."""
-        return 2.0 * most * float(np.abs(self._G).sum(axis=1).max())
 
     def _failed(self, reason: str, started: float) -> NmpcResult:
         self.reset()

@@ -1,7 +1,12 @@
-"""Section 2.4.6, Figures 2.20-2.21: a straight line from an offset, with (2.53) and without it."""
+"""Section 2.4.6, Figures 2.20-2.21: a straight line from an offset, with (2.53) and without it.
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+Each with the printed gains and with ours, because the gains decide how much the constraint matters:
+a controller that steers gently stays within the stable curvatures of its own accord.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +22,7 @@ from push_model import se2
 from push_model.arrays import Array
 from push_model.settings import SettingsError
 from push_model.trajectory import Trajectory, line
+from push_mpc.contact_force_mpc import PRINTED_GAINS
 from push_msgs.action import FollowTrajectory
 from push_planner import push_sides
 from push_ros.claims import own_domain
@@ -34,16 +40,31 @@ OPTIONS = {"uncertainty": "mild"}
 
 OFFSETS = (0.1, 0.2, 0.4, 0.5)
 """[m] phi of section 2.4.6."""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """controller: its name; constraint: whether it has (2.53) or (2.57); tracked: what it steers,
+    as ``TrackerSettings.tracked``; gains: settings of the controller. thesis: [mm] as printed."""
+
+    controller: str
+    constraint: bool
+    tracked: str
+    gains: Mapping[str, Any] = field(default_factory=dict)
+    thesis: str = "-"
+
+
 VARIANTS = {
-    "with (2.53)": ("contact_force", True, "robot"),
-    "without": ("contact_force", False, "robot"),
-    "with (2.57)": ("ltv", True, "object"),
+    "(2.53), printed gains": Variant("contact_force", True, "robot", PRINTED_GAINS, "< 10"),
+    "none, printed gains": Variant("contact_force", False, "robot", PRINTED_GAINS, "> 50"),
+    "(2.53), our gains": Variant("contact_force", True, "robot"),
+    "none, our gains": Variant("contact_force", False, "robot"),
+    "(2.57)": Variant("ltv", True, "object"),
 }
-"""Controller, whether it has its constraint, and what it steers: the thesis's, and ours."""
-THESIS = {"with (2.53)": "< 10", "without": "> 50", "with (2.57)": "-"}
-"""[mm] final average position error of the object, as printed."""
+"""By the constraint and the gains: the thesis's controller, and ours."""
 
 LENGTH, SPEED, ACCELERATION = 4.0, 0.07, 0.05
+_COLUMN = 24  # letters of a table's column
 _FINAL = 0.1  # of a run, at its end, over which the error is averaged
 _BOUND = 0.01  # [m] of that average
 _LIMIT = 200.0  # [s] of sim time
@@ -113,17 +134,32 @@ def trial(task: LineTask) -> Row:
         return _track(task)
 
 
-def _track(task: LineTask) -> Row:
-    controller, constraint, tracked = VARIANTS[task.variant]
-    scenario = load_scenario(task.scenario)
-    way = line(next(iter(scenario.robots.values()))[1], task.length, SPEED, ACCELERATION)
-    level = uncertainty(task.uncertainty)
-    believed, world, drawn = level.draw(aside(scenario, task.offset), task.seed)
+def world_of(task: LineTask) -> tuple[Scenario, Scenario, Row]:
+    """What the controller believes, with its settings; the world; what was drawn for it."""
+    variant = VARIANTS[task.variant]
+    scenario = aside(load_scenario(task.scenario), task.offset)
+    believed, world, drawn = uncertainty(task.uncertainty).draw(scenario, task.seed)
     believed = believed.settings(
-        "controller", controller=controller, **{f"tracker__{k}": v for k, v in _PATIENT.items()}
-    ).settings("controller", tracker__tracked=tracked)
-    if controller == "contact_force":
-        believed = believed.settings("controller", mpc__constraint=constraint)
+        "controller",
+        controller=variant.controller,
+        tracker__tracked=variant.tracked,
+        **{f"tracker__{k}": v for k, v in _PATIENT.items()},
+        **{f"mpc__{k}": v for k, v in variant.gains.items()},
+    )
+    if variant.controller == "contact_force":
+        believed = believed.settings("controller", mpc__constraint=variant.constraint)
+    return believed, world, drawn
+
+
+def _track(task: LineTask) -> Row:
+    variant = VARIANTS[task.variant]
+    believed, world, drawn = world_of(task)
+    way = line(
+        next(iter(load_scenario(task.scenario).robots.values()))[1],
+        task.length,
+        SPEED,
+        ACCELERATION,
+    )
     with LockstepRun(believed, world=world, quiet=True) as run:
         run.start()
         result = _follow(run, believed, way)
@@ -141,7 +177,7 @@ def _track(task: LineTask) -> Row:
         aside=in_robot[::10],
     )
     ended = result is not None and result.error_code == 0
-    good = not constraint or (ended and error <= _BOUND)
+    good = not variant.constraint or (ended and error <= _BOUND)
     why = "no end within the time limit" if result is None else result.error_msg or "done"
     return {
         "scenario": task.scenario,
@@ -180,13 +216,14 @@ def _follow(run: LockstepRun, scenario: Scenario, way: Trajectory) -> Any:
     if not sent.done() or not sent.result().accepted:
         raise RuntimeError("the controller does not take the trajectory")
     answer = sent.result().get_result_async()
-    return answer.result().result if run.spin_until(answer.done, _LIMIT) else None
+    ended = run.spin_until(answer.done, _LIMIT, math.inf)  # no wall clock: the machine may be busy
+    return answer.result().result if ended else None
 
 
 def conclude(options: StudyOptions, tasks: Sequence[LineTask], rows: list[Row]) -> None:
     """The table of final errors beside the thesis's, and the plots."""
     print("\nfinal average position error of the object [mm], mean (max) of the trials")
-    print("phi [m]     " + "".join(f"{v:>20s}" for v in VARIANTS))
+    print("phi [m]     " + "".join(f"{v:>{_COLUMN}s}" for v in VARIANTS))
     for phi in OFFSETS:
         cells = []
         for variant in VARIANTS:
@@ -196,8 +233,8 @@ def conclude(options: StudyOptions, tasks: Sequence[LineTask], rows: list[Row]) 
                 if r.get("offset_m") == phi and r.get("variant") == variant
             ]
             cells.append(f"{np.mean(errors):.2f} ({np.max(errors):.2f})" if errors else "-")
-        print(f"{phi:<12g}" + "".join(f"{c:>20s}" for c in cells))
-    print("thesis      " + "".join(f"{t:>20s}" for t in THESIS.values()))
+        print(f"{phi:<12g}" + "".join(f"{c:>{_COLUMN}s}" for c in cells))
+    print("thesis      " + "".join(f"{v.thesis:>{_COLUMN}s}" for v in VARIANTS.values()))
     for variant in VARIANTS:
         times = [r["solve_time_ms"] for r in rows if r.get("variant") == variant]
         late = [r["solve_time_p99_ms"] for r in rows if r.get("variant") == variant]

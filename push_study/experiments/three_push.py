@@ -1,6 +1,12 @@
-"""Section 2.4.6, Figure 2.22: the complete manipulation, with (2.53), without it, with (2.57).
+"""Section 2.4.6, Figure 2.22: the complete manipulation in three pushes, with (2.53) and without.
 
-The thesis makes three pushes of it. How many there are is left to the planner, which needs fewer.
+The room is so low that the object cannot be turned by pi in fewer pushes. Between two of them the
+robot steps back, drives round the object and approaches another side, as in the thesis. A plan of
+ours asks for no more than is stable, and its pushes begin within a millimetre of it: the constraint
+would have nothing to decide. So the longest push begins with an offset, like the lines of the first
+case study: robot and object are put aside together, still in contact. Who steers back too sharply
+loses the object. With (2.53) and without it the controller steers the robot and hopes for the
+object, as the thesis does; with (2.57) it steers the object.
 """
 
 from collections.abc import Sequence
@@ -16,25 +22,40 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from push_model import se2
+from push_model.arrays import Array
 from push_model.settings import SettingsError
+from push_mpc.contact_force_mpc import PRINTED_GAINS
 from push_ros.claims import own_domain
-from push_scenario.scenario import load_scenario
+from push_scenario.events import Displace
+from push_scenario.scenario import Scenario, load_scenario
+from push_study.graph_run import LockstepRun
 from push_study.job import digest, run_job
 from push_study.pool import Row
 from push_study.study import StudyOptions
 from push_study.uncertainty import uncertainty
+from push_supervisor.machine import State
 from push_view.bodies import bodies_of
 
 SCENARIOS = ("three-push",)
 """Where none are named."""
 OPTIONS = {"uncertainty": "mild"}
 
+_FORCES: dict[str, Any] = {"controller": "contact_force", "tracker__tracked": "robot"}
+_PRINTED: dict[str, Any] = {f"mpc__{name}": value for name, value in PRINTED_GAINS.items()}
+
 VARIANTS: dict[str, dict[str, Any]] = {
-    "with (2.53)": {"controller": "contact_force"},
-    "without": {"controller": "contact_force", "mpc__constraint": False},
-    "with (2.57)": {"controller": "ltv"},
+    "(2.53), printed gains": _FORCES | _PRINTED,
+    "none, printed gains": _FORCES | _PRINTED | {"mpc__constraint": False},
+    "(2.53), our gains": _FORCES,
+    "none, our gains": _FORCES | {"mpc__constraint": False},
+    "(2.57)": {"controller": "ltv"},
 }
 """Settings of the controller."""
+OFFSET = 0.06
+"""[m] by which robot and object are put aside; within what a controller calls off course."""
+_AFTER = 0.5  # [s] of the longest push until then
+_MOVES, _LASTS = 2e-3, 10  # [m] in 0.1 s, for so many of them: the object is pushed
+_PATIENCE = 300.0  # [s] of simulation time
 THESIS = (0.04, np.deg2rad(1.8))
 """[m], [rad] final error, as printed, with (2.53)."""
 
@@ -73,26 +94,80 @@ def tasks(options: StudyOptions) -> list[ThreePushTask]:
     return made
 
 
+class Offset:
+    """Puts robot and object aside, together, when the longest push of a plan has begun; once.
+
+    by ``(2,)``: [m] of what was done, in the world's frame; None as long as nothing was.
+    """
+
+    def __init__(self, scenario: Scenario, size: float) -> None:
+        self.by: Array | None = None
+        self._robot, self._item = scenario.robot()[0], scenario.object()[0]
+        self._size = size
+
+    def __call__(self, run: LockstepRun) -> None:
+        """Wait for the moment, and do it."""
+        machine, team = run.supervisor.machine, next(iter(run.teams.values()))
+
+        def longest() -> bool:
+            if machine.state is not State.PUSHING or not machine.segments:
+                return False
+            durations = [s.trajectory.duration for s in machine.segments]
+            return bool(machine.index == int(np.argmax(durations)))
+
+        run.spin_until(lambda: longest() or team.ended, _PATIENCE)
+        if not longest():
+            return
+        begin = run.bridge.time
+        run.spin_until(lambda: run.bridge.time >= begin + _AFTER, _PATIENCE)
+        robot = run.bridge.world.poses()[self._robot]
+        left = np.array([-np.sin(robot[2]), np.cos(robot[2])])
+        inward = left if robot[1] * left[1] < 0.0 else -left  # towards the middle of the room
+        self.by = self._size * inward
+        for body in (self._item, self._robot):
+            way = (float(self.by[0]), float(self.by[1]), 0.0)
+            run.bridge.disturb(Displace(at=run.bridge.time, body=body, by=way))
+
+
+def slid(robot: Array, item: Array) -> float:
+    """[m] that an object has moved along the bumper in a push, the most of all pushes.
+
+    robot, item: poses ``(n, 3)``, ten a second. A push is a time in which the object moves.
+    """
+    aside = np.array([se2.between(r, o)[1] for r, o in zip(robot, item, strict=True)])
+    moving = np.hypot(*np.diff(item[:, :2], axis=0).T) > _MOVES
+    most, begin = 0.0, -1
+    for k, moves in enumerate([*moving, False]):
+        if moves and begin < 0:
+            begin = k
+        elif not moves and begin >= 0:
+            if k - begin >= _LASTS:
+                most = max(most, float(np.ptp(aside[begin : k + 1])))
+            begin = -1
+    return most
+
+
 def trial(task: ThreePushTask) -> Row:
     """Bring the object to the goal once."""
     with own_domain():
         level = uncertainty(task.uncertainty)
         believed, world, drawn = level.draw(load_scenario(task.scenario), task.seed)
         believed = believed.settings("controller", **VARIANTS[task.variant])
-        measures, trace = run_job(believed, world)
+        offset = Offset(world, OFFSET)
+        measures, trace = run_job(believed, world, meanwhile=offset)
     Path(task.out).mkdir(parents=True, exist_ok=True)
-    np.savez_compressed(
-        task.trace_file,
-        time=np.array(trace.time[::10]),
-        robot=np.array(trace.robot[::10]),
-        object=np.array(trace.object[::10]),
-    )
+    robot, item = np.array(trace.robot[::10]), np.array(trace.object[::10])
+    np.savez_compressed(task.trace_file, time=np.array(trace.time[::10]), robot=robot, object=item)
     measures["reason"] = f"{task.variant}: {measures['reason']}"
+    if offset.by is None:
+        measures |= {"success": False, "reason": f"no offset; {measures['reason']}"}
     return {
         "scenario": task.scenario,
         "seed": task.seed,
         "variant": task.variant,
         **measures,
+        "slid_m": slid(robot, item),
+        "offset_m": 0.0 if offset.by is None else float(np.hypot(*offset.by)),
         "solve_time_ms": 1e3 * float(np.median(trace.solve_times or [np.nan])),
         **drawn,
     }
@@ -100,24 +175,24 @@ def trial(task: ThreePushTask) -> Row:
 
 def conclude(options: StudyOptions, tasks: Sequence[ThreePushTask], rows: list[Row]) -> None:
     """The final errors beside the thesis's, and the ways."""
-    print("\n               success  position [mm]  orientation [deg]   pushes  a solve [ms]")
-    print("                        mean     max   mean      max")
+    print("\n                       success  as planned  position [mm]  orientation [deg]", end="")
+    print("  pushes  slid [mm]")
     for variant in VARIANTS:
-        mine = [r for r in rows if r.get("variant") == variant]
+        mine = [r for r in rows if r.get("variant") == variant and "position_error_m" in r]
         if not mine:
             continue
         p = 1e3 * np.array([r["position_error_m"] for r in mine])
         o = np.rad2deg([r["orientation_error_rad"] for r in mine])
         pushes = np.mean([r["pushes"] for r in mine])
-        solve = np.median([r["solve_time_ms"] for r in mine])
+        most = 1e3 * max(r["slid_m"] for r in mine)
         wins = sum(bool(r["success"]) for r in mine)
+        planned = sum(bool(r["success"]) and r["replans"] == 0 for r in mine)
+        n = len(mine)
         print(
-            f"{variant:14s} {wins:3d}/{len(mine):<3d} {p.mean():7.2f} {p.max():7.2f} "
-            f"{o.mean():7.3f} {o.max():7.3f} {pushes:9.1f} {solve:11.3f}"
+            f"{variant:22s} {wins:3d}/{n:<3d} {planned:6d}/{n:<3d} {p.mean():7.2f} {p.max():6.2f} "
+            f"{o.mean():10.3f} {o.max():7.3f} {pushes:7.1f} {most:10.1f}"
         )
-    print(
-        f"thesis                   {1e3 * THESIS[0]:.0f}              {np.rad2deg(THESIS[1]):.1f}"
-    )
+    print(f"thesis {1e3 * THESIS[0]:41.0f} {np.rad2deg(THESIS[1]):17.1f} {3:15d}")
     _plot(tasks, options.out)
 
 

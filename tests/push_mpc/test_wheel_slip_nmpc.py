@@ -13,7 +13,8 @@ from push_mpc.wheel_slip_nmpc import WheelSlipNmpc, WheelSlipSettings, beside
 from push_scenario.scenario import load_scenario
 
 PIONEER = next(iter(load_scenario("pioneer").robots.values()))[0]
-FULL = replace(WheelSlipSettings(), friction_trust=1.0)
+FULL = replace(WheelSlipSettings(), friction_trust=1.0, sideways_share=1.0)
+"""(2.31)-(2.33) as printed."""
 
 
 @pytest.fixture
@@ -21,13 +22,17 @@ def nmpc():
     return WheelSlipNmpc(FULL, PIONEER)
 
 
-def rolled(nmpc, z, state):
+LOADS = [(0.0, 0.0), (8.0, -1.5)]
+"""[N], [Nm]: nothing, and a box that is pushed round a bend."""
+
+
+def rolled(nmpc, z, state, load):
     """States and inputs by Euler's rule, from the model itself."""
     robot, steps, step = nmpc.robot, nmpc.settings.horizon, nmpc.settings.step
     q, states, inputs = state.copy(), [], []
     for k in range(steps):
         j = 2 * min(k, len(z) // 2 - 1)
-        a, eps = robot.accelerations(q[3], q[4], z[j], z[j + 1])
+        a, eps = robot.accelerations(q[3], q[4], z[j], z[j + 1], load)
         inputs.append((z[j], z[j + 1]))
         states.append(q)
         rate = [np.cos(q[2]) * q[3], np.sin(q[2]) * q[3], q[4], a, eps]
@@ -35,19 +40,21 @@ def rolled(nmpc, z, state):
     return [*states, q], inputs
 
 
-def test_rows_and_cost_are_those_of_the_model(nmpc):
+@pytest.mark.parametrize(("load", "share"), [(LOADS[0], 1.0), (LOADS[1], 1.0), (LOADS[1], 0.5)])
+def test_rows_and_cost_are_those_of_the_model(load, share):
+    nmpc = WheelSlipNmpc(replace(FULL, sideways_share=share), PIONEER)
     random = np.random.default_rng(1)
     for state, reference in random_cases(40, 3):
         z = random.uniform(-3, 3, 12)
-        cost, _ = nmpc.evaluate(z, state, reference)
-        states, inputs = rolled(nmpc, z, state)
+        cost, _ = nmpc.evaluate(z, state, reference, load)
+        states, inputs = rolled(nmpc, z, state, load)
         rows = nmpc._c[: ROWS * nmpc.settings.horizon].reshape(-1, ROWS)
         expected = 0.0
         for k, (right, left) in enumerate(inputs):
             v, omega = states[k][3:]
-            margin = nmpc.robot.slip_margins(v, omega, right, left, 0.5)
+            margin = nmpc.robot.slip_margins(v, omega, right, left, 0.5, load, share)
             assert rows[k, :2] == pytest.approx(-NEWTON * margin, abs=0.011)  # rounded off
-            loads = nmpc.robot.loads(v, omega, right, left)
+            loads = nmpc.robot.loads(v, omega, right, left, load)
             assert rows[k, 2:5] == pytest.approx(-NEWTON * loads, abs=1e-9)
             x, y, _, v, omega = states[k + 1]
             turn = nmpc.robot.half_track * omega
@@ -63,17 +70,18 @@ def test_rows_and_cost_are_those_of_the_model(nmpc):
         assert cost == pytest.approx(expected, rel=1e-9)
 
 
-def test_slopes_against_differences(nmpc):
+@pytest.mark.parametrize("load", LOADS)
+def test_slopes_against_differences(nmpc, load):
     random = np.random.default_rng(2)
     for state, reference in random_cases(10, 5):
         z = random.uniform(-3, 3, 12)
-        nmpc.evaluate(z, state, reference)
+        nmpc.evaluate(z, state, reference, load)
         g, G = nmpc._g.copy(), nmpc._G.copy()
         for i in range(12):
             h = 1e-6 * np.eye(12)[i]
-            up, _ = nmpc.evaluate(z + h, state, reference)
+            up, _ = nmpc.evaluate(z + h, state, reference, load)
             above = nmpc._c.copy()
-            down, _ = nmpc.evaluate(z - h, state, reference)
+            down, _ = nmpc.evaluate(z - h, state, reference, load)
             assert g[i] == pytest.approx((up - down) / 2e-6, abs=1e-5)
             assert G[:, i] == pytest.approx((above - nmpc._c) / 2e-6, abs=1e-5)
 
@@ -157,18 +165,26 @@ def test_what_has_no_torques_or_no_caster_is_refused(robot):
         replace(FULL, state_weight=(0.0,) * 5)
 
 
-def test_loads_carry_the_weight_and_tractions_the_motion():
+@pytest.mark.parametrize("load", LOADS)
+def test_loads_carry_the_weight_and_tractions_the_motion(load):
+    """Newton and Euler, written down anew: forces, moments about the axle, moments about z."""
     robot = TorqueRobot.of(PIONEER)
+    drag, moment = load
     random = np.random.default_rng(4)
     for _ in range(300):
         v, omega, right, left = random.uniform([-1, -2, -4, -4], [1, 2, 4, 4])
-        a, eps = robot.accelerations(v, omega, right, left)
-        f_right, f_left, aside = robot.tractions(v, omega, right, left)
-        loads = robot.loads(v, omega, right, left)
+        a, eps = robot.accelerations(v, omega, right, left, load)
+        f_right, f_left, aside = robot.tractions(v, omega, right, left, load)
+        loads = robot.loads(v, omega, right, left, load)
         assert loads.sum() == pytest.approx(robot.mass * 9.81)
         along = robot.body_mass * (a - robot.ahead * omega**2) + 2 * robot.wheel_mass * a
-        assert f_right + f_left == pytest.approx(along)
+        assert f_right + f_left - drag == pytest.approx(along)
         about = robot.turning * eps + robot.body_mass * robot.ahead * v * omega
-        assert (f_right - f_left) * robot.half_track == pytest.approx(about)
+        assert (f_right - f_left) * robot.half_track + moment == pytest.approx(about)
         mass = robot.body_mass * (v * omega + robot.ahead * eps)
         assert aside == pytest.approx(mass + 2 * robot.wheel_mass * v * omega)
+        plain = robot.loads(
+            v, omega, right - 0.5 * drag * robot.radius, left - 0.5 * drag * robot.radius
+        )
+        leaned = (loads - plain)[2] * -robot.caster
+        assert leaned == pytest.approx(drag * PIONEER.bumper_z, abs=1e-9)
