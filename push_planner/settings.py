@@ -23,6 +23,12 @@ class PlannerSettings:
     lateral_offsets: tuple[float, ...] = (0.0, 0.25, -0.25, 0.5, -0.5)
     run_lengths: tuple[float, ...] = (0.15, 0.3, 0.6)
     scattered_poses: tuple[int, ...] = (0, 300, 1000)
+    manoeuvres: int = bounded(
+        150,
+        low=0,
+        high=100000,
+        doc="poses two pushes from start and goal each, more by so many in each further search",
+    )
     heuristic_weight: float = bounded(
         3.0, low=1.0, high=100.0, doc="of the guessed cost, where a search with 1 does not end"
     )
@@ -32,6 +38,9 @@ class PlannerSettings:
     )
     improvement_expansions: int = bounded(
         1500, low=0, high=10000000, doc="pushes tried after the first plan"
+    )
+    improvement_poses: int = bounded(
+        1000, low=0, high=100000, doc="scattered poses of the first improvement"
     )
     refinement: float = bounded(
         0.1, low=0.001, high=2.0, doc="[m] by which an improvement moves poses, halved every two"
