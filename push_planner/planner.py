@@ -31,6 +31,7 @@ from push_planner.thesis_search import ThesisSearch, poses_on
 _Ends = tuple[Array, Array]
 _WORTH = 0.002  # of the cost that a further plan must save
 _NEARBY = 40  # poses about each one that an improvement moves
+_SIZES = 9  # rounds after which an improvement moves poses by the first size again
 _WAYPOINTS = 30  # at most, in the first attempt
 _REACH = (10.0, 3.0)  # waypoints that a push leads on at most: of the settings; of a long path
 
@@ -183,7 +184,8 @@ class PushPlanner:
         for attempt, count in enumerate(settings.scattered_poses):
             guide = guides.number(attempt)
             yield Progress("guide path", None)
-            graph = self._graph(start, goal, guide, attempt, count, work)
+            around = settings.manoeuvres * attempt
+            graph = self._graph(start, goal, guide, attempt, count, around, work)
             work.poses += len(graph.poses) - 2
             if not graph.leave(work.statistics, enough=1):
                 continue
@@ -216,16 +218,17 @@ class PushPlanner:
             if work.left <= 0 or bound <= least:
                 break
             if number == 0:
-                count = settings.improvement_poses
-                graph = self._graph(start, goal, guides.all()[-1], 1, count, work)
+                count, most = settings.improvement_poses, settings.improvement_expansions // 2
+                graph = self._graph(start, goal, guides.all()[-1], 1, count, 0, work)
             else:
+                most = work.left
                 between = [self.scene.item.mass_pose(s.object_end) for s in best.segments[:-1]]
                 if not between:
                     break
-                size = settings.refinement / 2.0 ** ((number - 1) / 2)
+                size = settings.refinement / 2.0 ** ((number - 1) % _SIZES / 2)
                 poses = nearby(np.array(between), _NEARBY, size, work.random)
                 graph = PushGraph(self.scene, start, goal, poses.free(self.scene), np.inf)
-            search = PushSearch(graph, bound, 1.0, work.effort())
+            search = PushSearch(graph, bound, 1.0, min(most, work.effort()))
             for _ in search.run(work.statistics):
                 yield Progress(f"improving, round {number + 1}", best)
             work.left -= search.expanded
@@ -255,10 +258,18 @@ class PushPlanner:
         yield Progress("done", self._assemble(search, ends[1], guide, work))
 
     def _graph(
-        self, start: Array, goal: Array, guide: GuidePath, attempt: int, count: int, work: _Work
+        self,
+        start: Array,
+        goal: Array,
+        guide: GuidePath,
+        attempt: int,
+        count: int,
+        around: int,
+        work: _Work,
     ) -> PushGraph:
-        """Poses along a guide path, at its ends, and ``count`` scattered ones; the first attempt
-        leaves waypoints out where the path is long."""
+        """Poses along a guide path, at its ends, lined up with its narrow parts, ``count``
+        scattered ones, and ``around`` two pushes off each end; the first attempt leaves waypoints
+        out where the path is long."""
         scene, settings = self.scene, self.settings
         most = _WAYPOINTS * 2**attempt
         lengths = settings.run_lengths
@@ -267,10 +278,9 @@ class PushPlanner:
         candidates += lined_up(scene, guide)
         candidates += runs(scene, goal, -1.0, guide.length, lengths)
         candidates += scattered(scene, guide, count, work.random)
-        if attempt:
-            some = settings.manoeuvres * attempt
-            candidates += manoeuvres(scene, start, 1.0, 0.0, some, work.random)
-            candidates += manoeuvres(scene, goal, -1.0, guide.length, some, work.random)
+        if around:
+            candidates += manoeuvres(scene, start, 1.0, 0.0, around, work.random)
+            candidates += manoeuvres(scene, goal, -1.0, guide.length, around, work.random)
         spacing = max(settings.waypoint_spacing, guide.length / most)
         reach = max(_REACH[0] * settings.waypoint_spacing, _REACH[1] * spacing)
         return PushGraph(scene, start, goal, candidates.free(scene), reach)

@@ -2,9 +2,9 @@
 
 A state is an object pose and a side that is ready to push there. From a pose a push on a side leads
 to every other pose at which the robot has room, if its chord is as long as the turn needs
-(shortest_chord.py). Its cost is guessed from the chord and from the angles at both ends. A cubic
-between the same ends, tangents as long as its chord, stands for the push: where the object could
-not pass along it in any orientation, the push is guessed to take a detour, or not to be there.
+(shortest_chord.py). Its cost is guessed from the chord and from the angles at both ends. Three
+cubics between the same ends stand for the push: where the object could not pass along any of them
+in any orientation, the push is guessed to take a detour, or not to be there.
 Dijkstra's algorithm over all pairs of poses then costs less than a few hundred push curves, and it
 knows what the distance along Gamma does not: which headings the stable curvatures can reach, how
 many pushes that takes, what the changes of side add, and which pushes end at a wall.
@@ -24,6 +24,7 @@ _NEAREST = 0.03  # [m] of a push
 _WIDEST_COSINE = math.cos(WIDEST)
 _SIGHT_STEP = 0.02  # [m]
 _THICK = 0.1  # [m] of a cubic through obstacles that no push avoids
+_TANGENTS = (1.0, 0.5, 1.6)  # of the cubics, over the chord; those of pushes are 0.3 to 2.6
 _DETOUR = 0.6  # [m] guessed for such a cubic; less for one that only cuts a corner
 BLOCKED = 101
 """In ``sight``: a push that is not there, by its cubic or because it has been tried."""
@@ -64,12 +65,24 @@ def guessed_length(
 
 @numba.njit(cache=True)  # infinities: no fast mathematics
 def _crossed(
-    field: Any, a: Any, b: Any, grasp: Any, least: float, ox: float, oy: float, scale: float
+    field: Any,
+    a: Any,
+    b: Any,
+    tangent: float,
+    grasp: Any,
+    least: float,
+    ox: float,
+    oy: float,
+    scale: float,
 ) -> float:
     """How much of the object's way on the cubic from robot pose a to robot pose b is nearer to
-    obstacles than ``least``: a fraction of ``_THICK``, 1 at most. grasp: x, y of the object."""
+    obstacles than ``least``: a fraction of ``_THICK``, 1 at most.
+
+    tangent: of the cubic at both ends, over its chord. grasp: x, y of the object.
+    """
     dx, dy = b[0] - a[0], b[1] - a[1]
-    size = math.hypot(dx, dy)
+    chord_length = math.hypot(dx, dy)
+    size = tangent * chord_length
     t, crossed = 0.0, 0.0
     while t < 1.0 and crossed < _THICK:
         h, hi, hf = t * t * (3.0 - 2.0 * t), t * (t - 1.0) ** 2, t * t * (t - 1.0)
@@ -86,7 +99,7 @@ def _crossed(
             if least - room > 0.5 * _THICK:  # the way in and the way out are as long
                 return 1.0
         # No obstacle can be nearer than the room that there is.
-        t += max(_SIGHT_STEP, 0.7 * (room - least)) / max(speed, 0.5 * size)
+        t += max(_SIGHT_STEP, 0.7 * (room - least)) / max(speed, 0.5 * chord_length)
     return min(1.0, crossed / _THICK)
 
 
@@ -113,7 +126,11 @@ def _guess(
         known = sight[side, i, j - window[i, 0]]
         if known == 0:
             near = least[0] if i == 0 else least[1]
-            part = _crossed(field, a, b, grasps[side], near, ox, oy, scale)
+            part = 1.0
+            for tangent in _TANGENTS:
+                part = min(part, _crossed(field, a, b, tangent, grasps[side], near, ox, oy, scale))
+                if part == 0.0:
+                    break
             known = 1 + round((BLOCKED - 1) * part)
             sight[side, i, j - window[i, 0]] = known
         if known >= BLOCKED:

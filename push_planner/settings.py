@@ -40,10 +40,10 @@ class PlannerSettings:
         1500, low=0, high=10000000, doc="pushes tried after the first plan"
     )
     improvement_poses: int = bounded(
-        1000, low=0, high=100000, doc="scattered poses of the first improvement"
+        600, low=0, high=100000, doc="scattered poses of the first improvement"
     )
     refinement: float = bounded(
-        0.1, low=0.001, high=2.0, doc="[m] by which an improvement moves poses, halved every two"
+        0.15, low=0.001, high=2.0, doc="[m] by which an improvement moves poses, halved every two"
     )
     push_cost: float = bounded(0.05, low=0.0, high=10.0, doc="[m] added for the stop of each push")
     side_change_cost: float = bounded(0.3, low=0.0, high=10.0, doc="[m] added for a change of side")
@@ -58,7 +58,7 @@ class PlannerSettings:
     move_acceleration: float = bounded(0.15, low=0.005, high=5.0, doc="[m/s^2]")
     turn_rate: float = bounded(1.5, low=0.05, high=10.0, doc="[rad/s] on the spot")
     turn_acceleration: float = bounded(3.0, low=0.05, high=50.0, doc="[rad/s^2]")
-    improvement_rounds: int = bounded(12, low=0, high=50, doc="searches after the first plan")
+    improvement_rounds: int = bounded(20, low=0, high=50, doc="searches after the first plan")
     max_preemptive: int = bounded(
         8, low=0, high=100, doc="pre-emptive pushes from whose ends a plan is looked for"
     )
