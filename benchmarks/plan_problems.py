@@ -153,7 +153,7 @@ def _free(
     return None
 
 
-def problems(kind: str, item: ObjectSpec, count: int, seed: int) -> Iterator[Problem]:
+def problems_of(kind: str, item: ObjectSpec, count: int, seed: int) -> Iterator[Problem]:
     """Random problems of a kind, at both ends of which the object stands free on the map."""
     shape = item.geometry
     outline = shape.dense_outline(0.01)
