@@ -1,8 +1,9 @@
 """Plans: of the scenarios that ship with a goal, and of random problems, also among clutter.
 
-A problem counts as solvable if an exhaustive search solves it: with the same pushes and clearances,
-thousands of poses all over the map, many more pushes out of the start and into the goal, and many
-times the effort. The exhaustive search runs only where the planner has no plan.
+What can be solved at all is what an exhaustive search solves: the same pushes and clearances, with
+thousands of poses all over the map, others turned along every narrow place on it, many more pushes
+out of the start and into the goal, and many times the effort. It is asked only where the planner
+has no plan.
 
     python -m benchmarks.plan --problems 300 --worlds 6 --seed 1
 """
@@ -14,8 +15,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import maximum_filter
 
 from benchmarks.measure import Bound, at_least, at_most
+from benchmarks.plan_problems import KINDS, problems_of
 from push_model.occupancy import rasterise
 from push_model.specs import BoxSpec, CircleSpec, EnvironmentSpec
 from push_planner import PlannerSettings, PlanningFailed, PushPlanner
@@ -25,7 +28,10 @@ from push_scenario.scenario import load_scenario, scenario_names
 
 PROBLEMS, WORLDS, SEED = 110, 4, 1
 _PER_WORLD = 25
-_POSES, _SECOND, _EFFORT = 6000, 2000, 60000  # of an exhaustive search
+_POSES, _SECOND, _EFFORT = 4000, 1000, 60000  # of an exhaustive search
+_NARROW = 1000  # of its poses that lie along narrow places
+_ANGLES = 90  # that are tried for each of those
+_PER_KIND = 20
 _LENGTHS = (0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0)
 _BENDS = tuple(float(b) for b in np.linspace(-0.98, 0.98, 9))
 
@@ -87,6 +93,7 @@ def exhaustive(planner: PushPlanner, start: np.ndarray, goal: np.ndarray, seed: 
     x0, x1, y0, y1 = scene.field.grid.extent
     anywhere = random.uniform([x0, y0, -np.pi], [x1, y1, np.pi], (_POSES, 3))
     candidates = Candidates(anywhere, np.zeros(_POSES))
+    candidates += along_narrow_places(planner, random)
     for pose, direction in ((start, 1.0), (goal, -1.0)):
         near = runs(scene, pose, direction, 0.0, _LENGTHS, _BENDS).free(scene)
         candidates += near
@@ -103,6 +110,31 @@ def exhaustive(planner: PushPlanner, start: np.ndarray, goal: np.ndarray, seed: 
     for _ in search.run(statistics):
         pass
     return search.cost
+
+
+def along_narrow_places(planner: PushPlanner, random: np.random.Generator) -> Candidates:
+    """Poses anywhere on the map where it is little wider than the object, on the ridge between
+    obstacles, turned as the object has most clearance there and at the next centimetres."""
+    scene = planner.scene
+    field = scene.field
+    least = scene.shape.inradius + scene.settings.safety_distance
+    room = np.sqrt(field.values) * field.spacing
+    ridge = room >= maximum_filter(room, 5) - 1e-9
+    places = np.argwhere(ridge & (room >= least) & (room < 2.0 * scene.shape.circumradius))
+    if not len(places):
+        return Candidates(np.zeros((0, 3)), np.zeros(0))
+    angles = np.linspace(-np.pi, np.pi, _ANGLES, endpoint=False)
+    found = []
+    for row, column in places[random.integers(len(places), size=_NARROW // 4)]:
+        x, y = np.array([column, row]) * field.spacing + field.args[:2]
+        worst = np.full(_ANGLES, np.inf)
+        for step in (-0.06, -0.03, 0.0, 0.03, 0.06):
+            ahead = step * np.column_stack([np.cos(angles), np.sin(angles)])
+            poses = np.column_stack([np.array([x, y]) + ahead, angles])
+            worst = np.minimum(worst, scene.object_clearances(poses))
+        angle = float(angles[np.argmax(worst)])
+        found += [(x, y, angle + quarter * np.pi / 2.0) for quarter in range(4)]
+    return Candidates(np.array(found), np.zeros(len(found)))
 
 
 def cluttered(seed: int) -> EnvironmentSpec:
@@ -169,6 +201,44 @@ def study(name: str, planner: PushPlanner, count: int, seed: int) -> dict[str, A
     return result
 
 
+def kind_study(kind: str, count: int, seed: int) -> dict[str, Any]:
+    """Random problems of a kind, a map each; those without a plan go to the exhaustive search."""
+    scenario = load_scenario("env1-target1")
+    robot, item = scenario.robot()[1], scenario.object()[1]
+    outcomes, missed = [], []
+    for number, problem in enumerate(problems_of(kind, item, count, seed)):
+        planner = PushPlanner(PlannerSettings(), rasterise(problem.world), robot, item)
+        outcome = attempt(planner, problem.start, problem.goal)
+        outcomes.append(outcome)
+        if not outcome.costs:
+            cost = exhaustive(planner, problem.start, problem.goal, seed)
+            print(
+                f"    {kind} {number}: {outcome.why}; exhaustive search: {cost:.3f} m", flush=True
+            )
+            if np.isfinite(cost):
+                missed.append(number)
+    solved = [o for o in outcomes if o.costs]
+    first, final = (np.array([getattr(o, k) for o in solved]) for k in ("first", "final"))
+    print(
+        f"  {kind}, seed {seed}: {len(solved)} of {len(solved) + len(missed)} that can be solved, "
+        f"of {count}; first plan median {np.median(first):.3f} s, most {first.max():.3f} s; "
+        f"final most {final.max():.3f} s",
+        flush=True,
+    )
+    return {
+        "seed": seed,
+        "problems": count,
+        "solved": len(solved),
+        "solvable": len(solved) + len(missed),
+        "missed": missed,
+        "worse": sum(
+            any(b > a for a, b in zip(o.costs, o.costs[1:], strict=False)) for o in solved
+        ),
+        "first": first,
+        "final": final,
+    }
+
+
 def judged(name: str, studies: Sequence[dict[str, Any]]) -> dict[str, Bound]:
     """Bounds on all problems of some studies together: 25 are too few to tell 98 % from 95 %."""
     first, final = (np.concatenate([s.pop(key) for s in studies]) for key in ("first", "final"))
@@ -230,6 +300,9 @@ def run(count: int = PROBLEMS, worlds: int = WORLDS, seed: int = SEED) -> dict[s
         result[name] = study(name, planner, _PER_WORLD, seed + number)
         clutter.append(result[name])
     bounds |= judged("clutter", clutter) if clutter else {}
+    for kind in KINDS:
+        result[kind] = kind_study(kind, _PER_KIND, seed)
+        bounds |= judged(kind, [result[kind]])
     result["bounds"] = bounds
     return result
 

@@ -2,16 +2,16 @@
 
 from push_model.distance_field import DistanceField
 from push_planner.bodies import with_bodies
-from push_planner.planner import (
+from push_planner.planner import PushPlanner
+from push_planner.preemptive import plan_after_preemptive_push, preemptive_pushes
+from push_planner.push_curve import PushCurve, shortest_push_curve
+from push_planner.push_plan import (
     PlanError,
     PlanningFailed,
     PlanStatistics,
     Progress,
     PushPlan,
-    PushPlanner,
 )
-from push_planner.preemptive import plan_after_preemptive_push, preemptive_pushes
-from push_planner.push_curve import PushCurve, shortest_push_curve
 from push_planner.robot_path import NoRobotPath, RobotPathError, plan_robot_path
 from push_planner.scene import PushScene, PushSide, push_sides
 from push_planner.settings import PlannerSettings

@@ -13,6 +13,9 @@ from push_planner.scene import PushScene
 
 _SAME_ANGLE = 0.05  # [rad]
 _BENDS = (0.0, -0.9, 0.9)  # of the trusted curvature, in runs
+_FINE_BENDS = (0.0, -0.45, 0.45, -0.95, 0.95)  # of manoeuvres
+_SHORT = (0.04, 0.08, 0.15, 0.25, 0.4, 0.6, 0.9)  # [m] of the first push of a manoeuvre
+_SECOND = (0.1, 0.25, 0.5)  # [m] of the second
 _WIDEST = 1.0  # [m] beside Gamma at most, where poses are scattered
 
 
@@ -83,6 +86,26 @@ def runs(
                 robot = unicycle_step(contact, step, step * curvature, 1.0)
                 poses.append(se2.compose(robot, side.grasp))
     return Candidates(np.array(poses).reshape(-1, 3), np.full(len(poses), way))
+
+
+def manoeuvres(
+    scene: PushScene,
+    pose: Array,
+    direction: float,
+    way: float,
+    count: int,
+    random: np.random.Generator,
+) -> Candidates:
+    """Ends of short pushes out of a pose (direction 1), or starts of pushes into it (-1), and
+    ``count`` that are two pushes off: for a pose from which there are few ways."""
+    first = runs(scene, pose, direction, way, _SHORT, _FINE_BENDS).free(scene)
+    result = first
+    if len(first.poses):
+        parts = [runs(scene, p, direction, way, _SECOND).poses for p in first.poses]
+        poses = np.vstack(parts)
+        chosen = poses[random.permutation(len(poses))[:count]]
+        result += Candidates(chosen, np.full(len(chosen), way))
+    return result
 
 
 def scattered(

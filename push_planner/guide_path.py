@@ -250,7 +250,8 @@ def guide_paths(
     easy: float = 0.0,
     floor: float = 0.0,
 ) -> Iterator[GuidePath]:
-    """The sweep: a path for each clearance threshold, from the widest down.
+    """The sweep: a path for each clearance threshold, in the order that their ways on the lattice
+    have by (2.1): RRT* is asked for the next only when the one before it has been taken.
 
     Parameters
     ----------
@@ -279,21 +280,36 @@ def guide_paths(
     top = cap if widest >= cap else _NARROWER * widest
     low = min(easy, top)
     count = settings.clearance_levels if top > 1.05 * low else 1
+    levels = [float(level) for level in np.geomspace(top, low, count)]
+    offers = [_on_lattice(field, start, goal, level, settings, ends) for level in levels]
+    best = min((cost for cost, _, _ in offers), default=math.inf)
+    if least < low:
+        narrow = _on_lattice(field, start, goal, least, settings, ends)
+        if narrow[0] < best:
+            offers.append(narrow)
     found: list[GuidePath] = []
-    for level in np.geomspace(top, low, count):
-        path = _path_at(field, start, goal, float(level), settings, seed, ends)
-        if path is None or (found and np.array_equal(path.points, found[-1].points)):
+    for _, level, known in sorted(offers, key=lambda offer: offer[0]):
+        path = _path_at(field, start, goal, level, known, settings, seed, ends)
+        if path is None or any(np.array_equal(path.points, other.points) for other in found):
             continue
         found.append(path)
         yield path
-        if len(path.points) == 2:  # straight on: no other level can be better
+        if len(path.points) == 2 and level >= low:  # straight on: no other level can be better
             break
-    best = min((path.cost for path in found), default=math.inf)
-    narrow = lattice_path(field, start, goal, least, ends) if least < low else None
-    if narrow is not None and path_cost(field, narrow, settings, ends).cost < best:
-        path = _path_at(field, start, goal, least, settings, seed, ends)
-        assert path is not None
-        yield path
+
+
+def _on_lattice(
+    field: DistanceField,
+    start: Array,
+    goal: Array,
+    level: float,
+    settings: PlannerSettings,
+    ends: Array,
+) -> tuple[float, float, GuidePath | None]:
+    """Cost, clearance asked for [m], and the lattice's path with it; infinite cost without one."""
+    points = lattice_path(field, start, goal, level, ends)
+    path = None if points is None else path_cost(field, points, settings, ends)
+    return math.inf if path is None else path.cost, level, path
 
 
 def _path_at(
@@ -301,19 +317,19 @@ def _path_at(
     start: Array,
     goal: Array,
     level: float,
+    known: GuidePath | None,
     settings: PlannerSettings,
     seed: int,
     ends: Array,
 ) -> GuidePath | None:
-    """RRT*'s path with a clearance [m], unless the lattice has a much shorter one."""
+    """RRT*'s path with a clearance [m], unless the one known from the lattice is much shorter."""
     sampled = shortest_path(
         field, start, goal, level, settings.rrt_iterations, settings.rrt_range, seed, ends
     )
-    known = lattice_path(field, start, goal, level, ends)
-    paths = [path_cost(field, p, settings, ends) for p in (sampled, known) if p is not None]
-    if len(paths) == 2:
-        return paths[0] if paths[0].length <= _LONGER * paths[1].length else paths[1]
-    return paths[0] if paths else None
+    if sampled is None:
+        return known
+    path = path_cost(field, sampled, settings, ends)
+    return known if known is not None and path.length > _LONGER * known.length else path
 
 
 def waypoints(path: GuidePath, spacing: float) -> tuple[Array, Array, Array]:

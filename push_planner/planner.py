@@ -1,9 +1,7 @@
 """The two layers together: from start and goal pose to a plan of pushes that keeps improving."""
 
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
-from enum import IntEnum
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -14,9 +12,18 @@ from push_model.occupancy import OccupancyGrid
 from push_model.push_segment import PushSegment
 from push_model.specs import ObjectSpec, RobotSpec
 from push_model.trajectory import along_curve
-from push_planner.candidate_poses import along_guide, nearby, runs, scattered
+from push_planner.candidate_poses import along_guide, manoeuvres, nearby, runs, scattered
 from push_planner.guide_path import GuidePath, NoGuidePath, guide_paths, origin_floor
+from push_planner.narrow_way import lined_up
+from push_planner.push_plan import (
+    PlanError,
+    PlanningFailed,
+    PlanStatistics,
+    Progress,
+    PushPlan,
+)
 from push_planner.push_search import PushGraph, PushSearch, PushStep, SearchStatistics
+from push_planner.refusal import check_pose, check_room, why_not
 from push_planner.scene import PushScene
 from push_planner.settings import PlannerSettings
 from push_planner.thesis_search import ThesisSearch, poses_on
@@ -24,72 +31,9 @@ from push_planner.thesis_search import ThesisSearch, poses_on
 _Ends = tuple[Array, Array]
 _WORTH = 0.002  # of the cost that a further plan must save
 _NEARBY = 40  # poses about each one that an improvement moves
+_SIZES = 9  # rounds after which an improvement moves poses by the first size again
 _WAYPOINTS = 30  # at most, in the first attempt
 _REACH = (10.0, 3.0)  # waypoints that a push leads on at most: of the settings; of a long path
-
-
-class PlanError(IntEnum):
-    """Why there is no plan; the codes of the PlanPush action."""
-
-    NONE = 0
-    INVALID_GOAL = 101
-    OUTSIDE_MAP = 104
-    START_OCCUPIED = 105
-    GOAL_OCCUPIED = 106
-    NO_GUIDE_PATH = 107
-    NO_PUSH_SEQUENCE = 108
-
-
-class PlanningFailed(Exception):
-    """Raised when there is no plan; carries the code."""
-
-    def __init__(self, code: PlanError, message: str) -> None:
-        super().__init__(message)
-        self.code = code
-
-
-@dataclass(frozen=True)
-class PlanStatistics:
-    """How much work a plan took."""
-
-    rrt_iterations: int = 0
-    nodes_expanded: int = 0
-    nodes_generated: int = 0
-    curves_solved: int = 0
-    curves_feasible: int = 0
-    guide_cost: float = 0.0
-    guide_length: float = 0.0
-    guide_clearance: float = 0.0
-    plan_time: float = 0.0
-
-
-@dataclass(frozen=True)
-class PushPlan:
-    """cost [m]: g(q) of (2.10); length [m] of all pushes; clearance [m]; the guide path used.
-
-    goal ``(3,)`` and the segments' poses are of the object's geometric frame, the guide path is of
-    its centre of mass.
-    """
-
-    goal: Array
-    segments: tuple[PushSegment, ...]
-    cost: float
-    clearance: float
-    guide: GuidePath
-    statistics: PlanStatistics
-
-    @property
-    def length(self) -> float:
-        """[m] pushed in all."""
-        return sum(s.length for s in self.segments)
-
-
-@dataclass(frozen=True)
-class Progress:
-    """Where planning stands: what it is doing and the best plan so far."""
-
-    stage: str
-    best: PushPlan | None
 
 
 class _Work:
@@ -99,7 +43,7 @@ class _Work:
         self.seed = seed
         self.random = np.random.default_rng(seed)
         self.statistics = SearchStatistics()
-        self.iterations = 0
+        self.iterations = self.poses = 0
         self.ways_out = self.ways_in = False  # whether any push leaves the start, ends at the goal
         self.left = settings.total_expansions
         self._most = settings.max_expansions
@@ -122,6 +66,37 @@ class _Work:
             guide.clearance,
             time.perf_counter() - self._clock,
         )
+
+
+class _Guides:
+    """Guide paths, each made when it is first asked for."""
+
+    def __init__(self, source: Iterator[GuidePath], work: _Work, iterations: int) -> None:
+        self._source, self._work, self._iterations = source, work, iterations
+        self._found: list[GuidePath] = []
+
+    def _another(self) -> bool:
+        guide = next(self._source, None)
+        if guide is not None:
+            self._found.append(guide)
+            self._work.iterations += self._iterations
+        return guide is not None
+
+    def number(self, number: int) -> GuidePath:
+        """One after another, and again from the first."""
+        while len(self._found) <= number and self._another():
+            pass
+        if not self._found:
+            raise PlanningFailed(
+                PlanError.NO_GUIDE_PATH, "no path was found on which the object would fit"
+            )
+        return self._found[number % len(self._found)]
+
+    def all(self) -> list[GuidePath]:
+        """Those that there are."""
+        while self._another():
+            pass
+        return self._found
 
 
 class PushPlanner:
@@ -148,21 +123,7 @@ class PushPlanner:
 
     def check(self, pose: Array, what: str, occupied: PlanError) -> None:
         """Raise PlanningFailed unless the object can stand at the pose ``(3,)``."""
-        if not np.isfinite(pose).all():
-            raise PlanningFailed(PlanError.INVALID_GOAL, f"the {what} pose is not finite: {pose}")
-        grid = self.scene.field.grid
-        where = f"({pose[0]:.3f}, {pose[1]:.3f}, {pose[2]:.3f})"
-        if not grid.contains(pose[0], pose[1]):
-            x0, x1, y0, y1 = grid.extent
-            raise PlanningFailed(
-                PlanError.OUTSIDE_MAP,
-                f"the {what} {where} lies outside the map, x in [{x0:.2f}, {x1:.2f}], "
-                f"y in [{y0:.2f}, {y1:.2f}] m",
-            )
-        if self.scene.object_clearance(self.scene.item.mass_pose(pose)) <= 0.0:
-            raise PlanningFailed(
-                occupied, f"at the {what} {where} the object would overlap an obstacle"
-            )
+        check_pose(self.scene, pose, what, occupied)
 
     def lower_bound(self, start: Array, goal: Array) -> float:
         """[m] that no plan can cost less than.
@@ -198,32 +159,38 @@ class PushPlanner:
         goal = np.array([goal[0], goal[1], se2.wrap(goal[2])])
         self.check(start, "start", PlanError.START_OCCUPIED)
         self.check(goal, "goal", PlanError.GOAL_OCCUPIED)
-        self._check_room(start, "pushed away from the start", True)
-        self._check_room(goal, "pushed into the goal")
+        check_room(self.scene, start, "pushed away from the start", True)
+        check_room(self.scene, goal, "pushed into the goal")
         ends = start, goal
         start, goal = (self.scene.item.mass_pose(pose) for pose in ends)
-        guides = []
-        for guide in self._guides(start, goal, work.seed):
-            guides.append(guide)
-            work.iterations += settings.rrt_iterations
-            yield Progress("guide path", None)
-        if not guides:
-            raise PlanningFailed(
-                PlanError.NO_GUIDE_PATH, "no path from start to goal is wide enough for the object"
-            )
-        guides.sort(key=lambda g: g.cost)
+        guides = _Guides(self._guides(start, goal, work.seed), work, settings.rrt_iterations)
+        yield Progress("guide path", None)
+        guides.number(0)
         if settings.planner == "thesis":
-            yield from self._as_printed(ends, guides[0], work)
+            yield from self._as_printed(ends, min(guides.all(), key=lambda g: g.cost), work)
             return
         best: PushPlan | None = None
+        for progress in self._first_plan(ends, guides, work):
+            best = progress.best
+            yield progress
+        if best is None:
+            raise self._refusal(ends, guides.all(), work)
+        yield from self._improved(best, ends, guides, work)
+
+    def _first_plan(self, ends: _Ends, guides: _Guides, work: _Work) -> Iterator[Progress]:
+        """Search among more and more poses, until there is a plan."""
+        settings = self.settings
+        start, goal = (self.scene.item.mass_pose(pose) for pose in ends)
         for attempt, count in enumerate(settings.scattered_poses):
-            guide = guides[attempt % len(guides)]
-            graph = self._graph(start, goal, guide, attempt, count, work)
+            guide = guides.number(attempt)
+            yield Progress("guide path", None)
+            around = settings.manoeuvres * attempt
+            graph = self._graph(start, goal, guide, attempt, count, around, work)
+            work.poses += len(graph.poses) - 2
             if not graph.leave(work.statistics, enough=1):
                 continue
             work.ways_out = True
-            # Greedier when that does not end, and only by ways out of the start that there are;
-            # what has been tried is remembered.
+            # Greedier when that does not end; what has been tried by then is remembered.
             for weight in (1.0, settings.heuristic_weight):
                 if weight > 1.0:
                     graph.leave(work.statistics)
@@ -232,14 +199,18 @@ class PushPlanner:
                     yield Progress(f"push search {attempt + 1}", None)
                 work.left -= search.expanded
                 work.ways_in |= graph.arrivals > 0 or search.expanded == 0
-                if search.solution is not None or search.exhausted:
+                if search.solution is not None:
+                    yield Progress("improving", self._assemble(search, ends[1], guide, work))
+                    return
+                if search.exhausted:
                     break
-            if search.solution is not None:
-                best = self._assemble(search, ends[1], guide, work)
-                break
-        if best is None:
-            raise PlanningFailed(PlanError.NO_PUSH_SEQUENCE, self._why_not(*ends, work))
-        yield Progress("improving", best)
+
+    def _improved(
+        self, best: PushPlan, ends: _Ends, guides: _Guides, work: _Work
+    ) -> Iterator[Progress]:
+        """Search below the cost of the best plan: along another guide path, then near its poses."""
+        settings = self.settings
+        start, goal = (self.scene.item.mass_pose(pose) for pose in ends)
         least = self.lower_bound(*ends)
         work.left = settings.improvement_expansions
         for number in range(settings.improvement_rounds):
@@ -247,15 +218,17 @@ class PushPlanner:
             if work.left <= 0 or bound <= least:
                 break
             if number == 0:
-                graph = self._graph(start, goal, guides[-1], 1, settings.scattered_poses[-1], work)
+                count, most = settings.improvement_poses, settings.improvement_expansions // 2
+                graph = self._graph(start, goal, guides.all()[-1], 1, count, 0, work)
             else:
+                most = work.left
                 between = [self.scene.item.mass_pose(s.object_end) for s in best.segments[:-1]]
                 if not between:
                     break
-                size = settings.refinement / 2.0 ** ((number - 1) / 2)
+                size = settings.refinement / 2.0 ** ((number - 1) % _SIZES / 2)
                 poses = nearby(np.array(between), _NEARBY, size, work.random)
                 graph = PushGraph(self.scene, start, goal, poses.free(self.scene), np.inf)
-            search = PushSearch(graph, bound, 1.0, work.effort())
+            search = PushSearch(graph, bound, 1.0, min(most, work.effort()))
             for _ in search.run(work.statistics):
                 yield Progress(f"improving, round {number + 1}", best)
             work.left -= search.expanded
@@ -264,75 +237,53 @@ class PushPlanner:
                 yield Progress("improving", best)
         yield Progress("done", best)
 
+    def _refusal(self, ends: _Ends, guides: Sequence[GuidePath], work: _Work) -> PlanningFailed:
+        widest = max(guide.clearance for guide in guides)
+        ways = work.ways_out, work.ways_in
+        reason = why_not(self.scene, *ends, work.statistics, ways, work.poses, widest)
+        return PlanningFailed(PlanError.NO_PUSH_SEQUENCE, reason)
+
     def _as_printed(self, ends: _Ends, guide: GuidePath, work: _Work) -> Iterator[Progress]:
         """Layer 2 of the thesis: poses on Gamma alone, and no improvement."""
         start, goal = (self.scene.item.mass_pose(pose) for pose in ends)
         poses = poses_on(self.scene, guide).free(self.scene)
         graph = PushGraph(self.scene, start, goal, poses, np.inf)
+        work.poses = len(poses.poses)
         search = ThesisSearch(graph, work.left)
         for _ in search.run(work.statistics):
             yield Progress("push search", None)
         work.ways_out = work.ways_in = True
         if search.solution is None:
-            raise PlanningFailed(PlanError.NO_PUSH_SEQUENCE, self._why_not(*ends, work))
+            raise self._refusal(ends, [guide], work)
         yield Progress("done", self._assemble(search, ends[1], guide, work))
 
     def _graph(
-        self, start: Array, goal: Array, guide: GuidePath, attempt: int, count: int, work: "_Work"
+        self,
+        start: Array,
+        goal: Array,
+        guide: GuidePath,
+        attempt: int,
+        count: int,
+        around: int,
+        work: _Work,
     ) -> PushGraph:
-        """Poses along a guide path, at its ends, and ``count`` scattered ones; the first attempt
-        leaves waypoints out where the path is long."""
-        scene = self.scene
+        """Poses along a guide path, at its ends, lined up with its narrow parts, ``count``
+        scattered ones, and ``around`` two pushes off each end; the first attempt leaves waypoints
+        out where the path is long."""
+        scene, settings = self.scene, self.settings
         most = _WAYPOINTS * 2**attempt
-        lengths = self.settings.run_lengths
+        lengths = settings.run_lengths
         candidates = runs(scene, start, 1.0, 0.0, lengths)
         candidates += along_guide(scene, guide, start, goal, most)
+        candidates += lined_up(scene, guide)
         candidates += runs(scene, goal, -1.0, guide.length, lengths)
         candidates += scattered(scene, guide, count, work.random)
-        spacing = max(self.settings.waypoint_spacing, guide.length / most)
-        reach = max(_REACH[0] * self.settings.waypoint_spacing, _REACH[1] * spacing)
+        if around:
+            candidates += manoeuvres(scene, start, 1.0, 0.0, around, work.random)
+            candidates += manoeuvres(scene, goal, -1.0, guide.length, around, work.random)
+        spacing = max(settings.waypoint_spacing, guide.length / most)
+        reach = max(_REACH[0] * settings.waypoint_spacing, _REACH[1] * spacing)
         return PushGraph(scene, start, goal, candidates.free(scene), reach)
-
-    def _check_room(self, pose: Array, what: str, leaving: bool = False) -> None:
-        """Raise PlanningFailed when the object can be pushed on no side at the pose ``(3,)``."""
-        centre = self.scene.item.mass_pose(pose)
-        where = f"({pose[0]:.3f}, {pose[1]:.3f}, {pose[2]:.3f})"
-        needed = self.scene.leaving(centre) if leaving else self.settings.safety_distance
-        clearance = self.scene.object_clearance(centre)
-        if clearance < needed:
-            raise PlanningFailed(
-                PlanError.NO_PUSH_SEQUENCE,
-                f"the object cannot be {what} {where}: it is {1e3 * clearance:.1f} mm from an "
-                f"obstacle there, and pushes keep {1e3 * needed:.1f} mm",
-            )
-        sides = self.scene.sides
-        if not sides:
-            raise PlanningFailed(
-                PlanError.NO_PUSH_SEQUENCE,
-                f"no side of the object can be pushed: {self.scene.why_no_sides()}",
-            )
-        if not any(self.scene.has_room(s.robot_pose(centre), s, needed) for s in sides):
-            behind = ", ".join(f"{s.index} ({1e3 * self.scene.back(s):.0f} mm)" for s in sides)
-            around = 1e3 * self.scene.robot_keeps(needed)
-            raise PlanningFailed(
-                PlanError.NO_PUSH_SEQUENCE,
-                f"no side of the object can be {what} {where}: behind each that can be pushed the "
-                f"robot, which needs {around:.1f} mm around it and some way to back off, would "
-                f"touch an obstacle: sides {behind}",
-            )
-
-    def _why_not(self, start: Array, goal: Array, work: "_Work") -> str:
-        """What the searches have found out."""
-        statistics = work.statistics
-        tried = f"{statistics.feasible} of {statistics.solved} pushes tried are free"
-        for found, pose, what in (
-            (work.ways_out, start, "leads away from the start"),
-            (work.ways_in, goal, "ends at the goal"),
-        ):
-            if not found:
-                where = f"({pose[0]:.3f}, {pose[1]:.3f}, {pose[2]:.3f})"
-                return f"no push {what} {where} without a collision; {tried}"
-        return f"no sequence of pushes reaches the goal; {tried}"
 
     def solve(self, start: Array, goal: Array, seed: int | None = None) -> PushPlan:
         """The final plan of ``plan``."""
@@ -391,7 +342,7 @@ class PushPlanner:
         )
 
     def _assemble(
-        self, search: PushSearch | ThesisSearch, goal: Array, guide: GuidePath, work: "_Work"
+        self, search: PushSearch | ThesisSearch, goal: Array, guide: GuidePath, work: _Work
     ) -> PushPlan:
         assert search.solution is not None
         segments = tuple(self.segment(step) for step in search.solution)

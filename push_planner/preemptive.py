@@ -13,8 +13,9 @@ from push_model import se2
 from push_model.arrays import Array
 from push_model.kinematics import unicycle_step
 from push_model.push_segment import PushSegment
-from push_planner.planner import PlanError, PlanningFailed, Progress, PushPlan, PushPlanner
+from push_planner.planner import PushPlanner
 from push_planner.push_curve import shortest_push_curve
+from push_planner.push_plan import PlanError, PlanningFailed, Progress, PushPlan
 from push_planner.push_search import PushStep
 
 
@@ -74,7 +75,7 @@ def plan_after_preemptive_push(
     planner.check(goal, "goal", PlanError.GOAL_OCCUPIED)
     offers = preemptive_pushes(planner, start, goal, seed)[: planner.settings.max_preemptive]
     yield Progress("pre-emptive pushes", None)
-    failure = "no push leads away from the start"
+    failure = "no push away from the start was found"
     for number, offer in enumerate(offers, 1):
         stage = f"after pre-emptive push {number} of {len(offers)}"
         rest: PushPlan | None = None

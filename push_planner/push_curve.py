@@ -22,7 +22,7 @@ _ROUNDS = 100  # of a compass search; few need 40, but one can creep to k = infi
 _SHORTEST = 0.02  # [m] least k_i, k_f; (2.6)
 
 
-def _basis(n: int) -> Array:
+def basis_rows(n: int) -> Array:
     """Rows: s' and s'' coefficients of (end point, k_f, k_i) with the start at the origin."""
     s = np.linspace(0.0, 1.0, n)
     f1, g1 = 3 * s**2 - 2 * s, (s - 1) ** 2 + 2 * s * (s - 1)
@@ -30,7 +30,7 @@ def _basis(n: int) -> Array:
     return np.ascontiguousarray(np.array([3 * s**2 - 3 * f1, f1, g1, 6 * s - 3 * f2, f2, g2]).T)
 
 
-_BASIS_COARSE, _BASIS_DENSE = _basis(_COARSE), _basis(_DENSE)
+_BASIS_COARSE, _BASIS_DENSE = basis_rows(_COARSE), basis_rows(_DENSE)
 
 
 @numba.njit(cache=True, fastmath=True)

@@ -6,7 +6,8 @@ which the push that starts there pushes; its parent is nearer to the goal.
 Algorithm 2 makes every push into a node before it looks at the next one, and stops after the
 farthest few. Here no push is lost, and few are made: all pushes into a node are guessed
 (rough_cost.py), and only the one that looks best in the whole queue is solved and swept (lazy
-weighted A*). What has been found out about a push is kept for all nodes that it could lead to.
+weighted A*). What has been found out about a push is kept, for all nodes that it could lead to
+and for the guesses of later searches.
 """
 
 import heapq
@@ -23,8 +24,9 @@ from push_model import se2
 from push_model.arrays import Array
 from push_planner.candidate_poses import Candidates
 from push_planner.push_curve import PushCurve, shortest_push_curve
-from push_planner.rough_cost import guessed_length, pushes_into, rough_costs
+from push_planner.rough_cost import BLOCKED, guessed_length, pushes_into, rough_costs
 from push_planner.scene import PushScene, PushSide
+from push_planner.shortest_chord import shortest_chords
 
 _SLICE = 20  # pushes tried between two reports
 
@@ -103,31 +105,36 @@ class PushGraph:
             scene.has_room(r[0, :3], side, self.leaving)
             for r, side in zip(robots, scene.sides, strict=True)
         ]
-        self.diameters = np.array(
-            [[2.0 / s.trusted.maximum, -2.0 / s.trusted.minimum] for s in scene.sides]
+        self.grasps = np.array([s.grasp for s in scene.sides])
+        self.chords = np.array(
+            [shortest_chords(s.trusted.minimum, s.trusted.maximum) for s in scene.sides]
         )
         settings = scene.settings
-        self._shut = np.zeros(self.room.shape, dtype=np.bool_)
         widest = int((self.window[:, 1] - self.window[:, 0]).max())
-        sight = np.zeros((len(self.poses), widest), dtype=np.int8)
+        self._sight = np.zeros((*self.room.shape, widest), dtype=np.int8)
         self._costs = (settings.push_cost, settings.side_change_cost)
-        least = scene.shape.inradius + settings.safety_distance
-        self._view = (self._shut, self.window, sight, least, scene.field.values, *scene.field.args)
+        keeps = np.array([self.leaving, settings.safety_distance])
+        least = scene.shape.inradius + np.minimum(keeps, settings.safety_distance)
+        self._view = (self.window, self._sight, least, scene.field.values, *scene.field.args)
         self.arrivals = 0  # pushes found that end at the goal
         self._pushes: dict[tuple[int, int, int], PushStep | None] = {}
 
     def rough_costs(self, bound: float) -> tuple[Array, float]:
         """Guessed cost [m] to come to each state ``(n, sides)``, and that of a plan."""
         ready, arrived = rough_costs(
-            self.poses, self.robots, self.room, self.diameters, *self._costs, bound, *self._view
+            self.poses,
+            self.robots,
+            self.room,
+            self.chords,
+            self.grasps,
+            *self._costs,
+            bound,
+            *self._view,
         )
         return ready, float(arrived[-1].min())
 
     def leave(self, statistics: SearchStatistics, enough: float = math.inf) -> int:
-        """Try pushes out of the start, until ``enough`` are found; how many are.
-
-        Guesses leave out from now on those that cannot be made.
-        """
+        """Try pushes out of the start, until ``enough`` are found; how many are."""
         found = 0
         for side in range(len(self.scene.sides)):
             for pose in range(1, self.window[0, 1]):
@@ -142,8 +149,8 @@ class PushGraph:
         if not (self.room[side, 0] and self.room[side, pose]):
             return False
         (ax, ay, _, ac, sa), (bx, by, _, bc, sb) = self.robots[side, 0], self.robots[side, pose]
-        left, right = self.diameters[side]
-        return bool(guessed_length(ax, ay, ac, sa, bx, by, bc, sb, left, right) < math.inf)
+        length = guessed_length(ax, ay, ac, sa, bx, by, bc, sb, self.chords[side])
+        return bool(length < math.inf)
 
     def pushes_into(
         self, pose: int, following: int, cost: float, weight: float, bound: float, ready: Array
@@ -157,7 +164,8 @@ class PushGraph:
             self.poses,
             self.robots,
             self.room,
-            self.diameters,
+            self.chords,
+            self.grasps,
             *self._costs,
             bound,
             *self._view,
@@ -182,8 +190,8 @@ class PushGraph:
             if self._pushes[key] is not None:
                 statistics.feasible += 1
                 self.arrivals += last == len(self.poses) - 1
-            elif first == 0:
-                self._shut[side, last] = True
+            elif self.window[first, 0] <= last < self.window[first, 1]:
+                self._sight[side, first, last - self.window[first, 0]] = BLOCKED
         return self._pushes[key]
 
     def _try(self, first: int, last: int, number: int) -> PushStep | None:

@@ -1,11 +1,13 @@
-"""What plans would cost if every push that need not loop could be made: the guess that leads A*.
+"""What plans would cost if every push that seems possible could be made: the guess that leads A*.
 
 A state is an object pose and a side that is ready to push there. From a pose a push on a side leads
-to every other pose at which the robot has room, unless it would have to loop. Its cost is guessed
-from the chord and from the angles at both ends; what crosses an obstacle in a straight line is
-guessed to take a detour. Dijkstra's algorithm over all pairs of poses then costs less than a few
-hundred push curves, and it knows what the distance along Gamma does not: which headings the
-stable curvatures can reach, how many pushes that takes, and what the changes of side add.
+to every other pose at which the robot has room, if its chord is as long as the turn needs
+(shortest_chord.py). Its cost is guessed from the chord and from the angles at both ends. Three
+cubics between the same ends stand for the push: where the object could not pass along any of them
+in any orientation, the push is guessed to take a detour, or not to be there.
+Dijkstra's algorithm over all pairs of poses then costs less than a few hundred push curves, and it
+knows what the distance along Gamma does not: which headings the stable curvatures can reach, how
+many pushes that takes, what the changes of side add, and which pushes end at a wall.
 """
 
 import heapq
@@ -16,12 +18,17 @@ import numba
 import numpy as np
 
 from push_model.distance_field import lookup
+from push_planner.shortest_chord import WIDEST, chord
 
 _NEAREST = 0.03  # [m] of a push
-_WIDEST_COSINE = -0.4161468365471424  # of 2 rad: a push's end seen from its start, and vice versa
+_WIDEST_COSINE = math.cos(WIDEST)
 _SIGHT_STEP = 0.02  # [m]
-_THICK = 0.2  # [m] of a chord through an obstacle that no push bends round
-_DETOUR = 0.6  # [m] guessed for such a chord; less for one that only cuts a corner
+_THICK = 0.1  # [m] of a cubic through obstacles that no push avoids
+_TANGENTS = (1.0, 0.5, 1.6)  # of the cubics, over the chord; those of pushes are 0.3 to 2.6
+_DETOUR = 0.6  # [m] guessed for such a cubic; less for one that only cuts a corner
+BLOCKED = 101
+"""In ``sight``: a push that is not there, by its cubic or because it has been tried."""
+_SURE = 0.93  # of the shortest chord in the table, which is interpolated
 
 
 @numba.njit(cache=True)  # infinities: no fast mathematics
@@ -34,14 +41,12 @@ def guessed_length(
     by: float,
     bc: float,
     sb: float,
-    left: float,
-    right: float,
+    chords: Any,
 ) -> float:
     """[m] of a push from a to b, poses as x, y, cosine, sine; inf where it would have to loop.
 
-    Either pose must lie outside the tightest circle that the other one touches on that side; left
-    and right are the diameters [m]. Otherwise the length is that of the cubic whose slopes over
-    the chord are small.
+    chords: the table of shortest chords. The length is that of the cubic whose slopes over the
+    chord are small.
     """
     dx, dy = bx - ax, by - ay
     square = dx * dx + dy * dy
@@ -52,30 +57,49 @@ def guessed_length(
     distance = math.sqrt(square)
     if ahead < _WIDEST_COSINE * distance or arriving < _WIDEST_COSINE * distance:
         return math.inf
-    for along, off in ((ahead, aside), (arriving, beside)):
-        diameter = left if off > 0.0 else right
-        lateral = abs(off)
-        if along > 0.0:
-            if square < diameter * lateral:
-                return math.inf
-        elif distance < diameter:
-            return math.inf
-    a, b = -aside / distance, beside / distance
-    return distance * (1.0 + (2.0 * a * a + 2.0 * b * b - a * b) / 30.0)
+    if distance < _SURE * chord(chords, aside / (distance + ahead), beside / (distance + arriving)):
+        return math.inf
+    a, b = aside / distance, beside / distance
+    return distance * (1.0 + (2.0 * a * a + 2.0 * b * b + a * b) / 30.0)
 
 
 @numba.njit(cache=True)  # infinities: no fast mathematics
-def _crossed(field: Any, a: Any, b: Any, least: float, ox: float, oy: float, scale: float) -> float:
-    """How much of the straight line from a to b is nearer to obstacles than ``least``: a fraction
-    of ``_THICK``, 1 at most."""
+def _crossed(
+    field: Any,
+    a: Any,
+    b: Any,
+    tangent: float,
+    grasp: Any,
+    least: float,
+    ox: float,
+    oy: float,
+    scale: float,
+) -> float:
+    """How much of the object's way on the cubic from robot pose a to robot pose b is nearer to
+    obstacles than ``least``: a fraction of ``_THICK``, 1 at most.
+
+    tangent: of the cubic at both ends, over its chord. grasp: x, y of the object.
+    """
     dx, dy = b[0] - a[0], b[1] - a[1]
-    length = math.hypot(dx, dy)
-    way, crossed = 0.0, 0.0
-    while way < length and crossed < _THICK:
-        room = lookup(field, a[0] + dx * way / length, a[1] + dy * way / length, ox, oy, scale)
+    chord_length = math.hypot(dx, dy)
+    size = tangent * chord_length
+    t, crossed = 0.0, 0.0
+    while t < 1.0 and crossed < _THICK:
+        h, hi, hf = t * t * (3.0 - 2.0 * t), t * (t - 1.0) ** 2, t * t * (t - 1.0)
+        d, di, df = 6.0 * t * (1.0 - t), (t - 1.0) * (3.0 * t - 1.0), t * (3.0 * t - 2.0)
+        x = a[0] + h * dx + size * (hi * a[3] + hf * b[3])
+        y = a[1] + h * dy + size * (hi * a[4] + hf * b[4])
+        vx, vy = d * dx + size * (di * a[3] + df * b[3]), d * dy + size * (di * a[4] + df * b[4])
+        speed = math.hypot(vx, vy) + 1e-9
+        qx = x + (vx * grasp[0] - vy * grasp[1]) / speed
+        qy = y + (vy * grasp[0] + vx * grasp[1]) / speed
+        room = lookup(field, qx, qy, ox, oy, scale)
         if room < least:
             crossed += _SIGHT_STEP
-        way += max(_SIGHT_STEP, room - least)  # no obstacle can be nearer than that
+            if least - room > 0.5 * _THICK:  # the way in and the way out are as long
+                return 1.0
+        # No obstacle can be nearer than the room that there is.
+        t += max(_SIGHT_STEP, 0.7 * (room - least)) / max(speed, 0.5 * chord_length)
     return min(1.0, crossed / _THICK)
 
 
@@ -84,12 +108,12 @@ def _guess(
     i: int,
     j: int,
     side: int,
-    poses: Any,
     robots: Any,
-    diameters: Any,
+    chords: Any,
+    grasps: Any,
     window: Any,
     sight: Any,
-    least: float,
+    least: Any,
     field: Any,
     ox: float,
     oy: float,
@@ -97,15 +121,21 @@ def _guess(
 ) -> float:
     """Guessed length [m] of the push from pose i to pose j; sight remembers what is crossed."""
     a, b = robots[side, i], robots[side, j]
-    length = guessed_length(
-        a[0], a[1], a[3], a[4], b[0], b[1], b[3], b[4], diameters[side, 0], diameters[side, 1]
-    )
+    length = guessed_length(a[0], a[1], a[3], a[4], b[0], b[1], b[3], b[4], chords[side])
     if length < math.inf:
-        known = sight[i, j - window[i, 0]]
+        known = sight[side, i, j - window[i, 0]]
         if known == 0:
-            known = 1 + round(100.0 * _crossed(field, poses[i], poses[j], least, ox, oy, scale))
-            sight[i, j - window[i, 0]] = known
-        length += 0.01 * (known - 1) * _DETOUR
+            near = least[0] if i == 0 else least[1]
+            part = 1.0
+            for tangent in _TANGENTS:
+                part = min(part, _crossed(field, a, b, tangent, grasps[side], near, ox, oy, scale))
+                if part == 0.0:
+                    break
+            known = 1 + round((BLOCKED - 1) * part)
+            sight[side, i, j - window[i, 0]] = known
+        if known >= BLOCKED:
+            return math.inf
+        length += (known - 1) / (BLOCKED - 1) * _DETOUR
     return float(length)
 
 
@@ -114,14 +144,14 @@ def rough_costs(
     poses: Any,
     robots: Any,
     room: Any,
-    diameters: Any,
+    chords: Any,
+    grasps: Any,
     push_cost: float,
     change_cost: float,
     bound: float,
-    shut: Any,
     window: Any,
     sight: Any,
-    least: float,
+    least: Any,
     field: Any,
     ox: float,
     oy: float,
@@ -134,12 +164,13 @@ def rough_costs(
     poses: ``(n, 3)`` of the object.
     robots: ``(sides, n, 5)`` x, y, theta, cosine, sine of the robot in contact.
     room: ``(sides, n)`` whether the robot can come to that contact.
-    diameters: ``(sides, 2)`` [m] of the tightest circles to the left and to the right.
+    chords: ``(sides, k, k)`` [m] tables of shortest chords. grasps: ``(sides, 3)`` of the object in
+        the robot frame.
     bound: [m] states whose guess and distance to the goal exceed it are left out.
-    shut: ``(sides, n)`` whether the push from the first pose is known not to be there.
     window: ``(n, 2)`` of each pose, the first and one past the last one that it has pushes with.
-    sight: ``(n, widest window)`` int8, zeros at first: what is known of the chords.
-    least: [m] distance that a chord keeps from obstacles unless it crosses them.
+    sight: ``(sides, n, widest window)`` int8, zeros at first: what is known of the pushes.
+    least: [m] distances that the object keeps from obstacles on pushes out of the first pose, and
+        on all others.
 
     Returns
     -------
@@ -164,15 +195,15 @@ def rough_costs(
         if i == goal or cost > ready[i, s]:
             continue
         for j in range(max(1, window[i, 0]), window[i, 1]):
-            if j == i or not room[s, j] or (i == 0 and shut[s, j]):
+            if j == i or not room[s, j]:
                 continue
             dx, dy = robots[s, j, 0] - robots[s, i, 0], robots[s, j, 1] - robots[s, i, 1]
-            chord = math.sqrt(dx * dx + dy * dy)
+            straight = math.sqrt(dx * dx + dy * dy)
             before = cost + push_cost
-            if before + chord >= arrived[j, s] or before + chord + remaining[j] >= bound:
+            if before + straight >= min(arrived[j, s], bound - remaining[j]):
                 continue
             length = _guess(
-                i, j, s, poses, robots, diameters, window, sight, least, field, ox, oy, scale
+                i, j, s, robots, chords, grasps, window, sight, least, field, ox, oy, scale
             )
             after = before + length
             if after >= arrived[j, s]:
@@ -202,11 +233,11 @@ def pushes_into(
     poses: Any,
     robots: Any,
     room: Any,
-    diameters: Any,
+    chords: Any,
+    grasps: Any,
     push_cost: float,
     change_cost: float,
     bound: float,
-    shut: Any,
     window: Any,
     sight: Any,
     least: float,
@@ -236,10 +267,10 @@ def pushes_into(
                 robots[following, j, 1] - robots[s, j, 1],
             )
         for i in range(window[j, 0], min(window[j, 1], n - 1)):
-            if i == j or before + ready[i, s] >= bound or (i == 0 and shut[s, j]):
+            if i == j or before + ready[i, s] >= bound or not window[i, 0] <= j < window[i, 1]:
                 continue
             length = _guess(
-                i, j, s, poses, robots, diameters, window, sight, least, field, ox, oy, scale
+                i, j, s, robots, chords, grasps, window, sight, least, field, ox, oy, scale
             )
             if before + length + ready[i, s] < bound:
                 estimates[found] = before + length + weight * ready[i, s]

@@ -32,6 +32,7 @@ _OUTLINE_SPACING = 0.01  # [m] of points between which distances are interpolate
 _LEAVING = 0.15  # [m] of the first push, in which it may be nearer to obstacles than later
 _LEAST = 0.003  # [m] that the robot keeps even then
 _APART = 0.005  # [m] between poses of the robot that are looked at by themselves
+_CLOSE = 0.5  # of the stand-off, where there is no room for all of it
 _TURNING = 0.25  # of the safety distance that it keeps where it turns, before a push
 
 
@@ -195,13 +196,18 @@ class PushScene:
         poses = np.column_stack([points, heading])
         return min(self.robot_clearance(pose) for pose in poses)
 
-    def back(self, side: PushSide) -> float:
-        """[m] from contact with a side to where the robot may turn: out of a recess, and on."""
-        return side.depth + self.settings.standoff
+    def backs(self, side: PushSide) -> tuple[float, float]:
+        """[m] from contact with a side to where the robot may turn: out of a recess, and on.
+
+        The second, half as far from the object, is for where there is no room for the first.
+        """
+        return side.depth + self.settings.standoff, side.depth + _CLOSE * self.settings.standoff
 
     def standoff(self, contact_pose: Array, side: PushSide) -> Array:
         """Robot pose ``(3,)`` behind a contact pose, where an approach begins."""
-        return se2.compose(contact_pose, np.array([-self.back(side), 0.0, 0.0]))
+        far, near = self.backs(side)
+        back = far if self._rooms(contact_pose[None], far, _LEAST)[0] else near
+        return se2.compose(contact_pose, np.array([-back, 0.0, 0.0]))
 
     def rooms(
         self, contact_poses: Array, side: PushSide, leaving: float = math.inf
@@ -210,11 +216,19 @@ class PushScene:
 
         leaving: [m] that the object has there, where that is less than the safety distance.
         """
+        far, near = self.backs(side)
+        result = self._rooms(contact_poses, far, self.robot_keeps(leaving))
+        if not result.all():
+            result[~result] = self._rooms(contact_poses[~result], near, self.robot_keeps(leaving))
+        return result
+
+    def _rooms(self, contact_poses: Array, back: float, keeps: float) -> NDArray[np.bool_]:
+        """``rooms`` to back off so far [m], the robot keeping so much [m]."""
         result: NDArray[np.bool_] = rooms_behind(
             contact_poses,
-            self.back(side),
+            back,
             self.robot.footprint_radius + _TURNING * self.settings.safety_distance,
-            self.robot_keeps(leaving),
+            keeps,
             self.field.values,
             self._robot_points,
             *self.field.args,

@@ -45,6 +45,12 @@ class PlannerSettings:
     scattered_poses: tuple[int, ...] = bounded(
         (0, 300, 1000), doc="Random poses near the guide path that are added in each search"
     )
+    manoeuvres: int = bounded(
+        150,
+        low=0,
+        high=100000,
+        doc="Poses two pushes away from start and goal that each further search adds",
+    )
     heuristic_weight: float = bounded(
         3.0,
         low=1.0,
@@ -63,8 +69,11 @@ class PlannerSettings:
     improvement_expansions: int = bounded(
         1500, low=0, high=10000000, doc="Maximum number of pushes evaluated after the first plan"
     )
+    improvement_poses: int = bounded(
+        600, low=0, high=100000, doc="Scattered poses that the first improvement adds"
+    )
     refinement: float = bounded(
-        0.1,
+        0.15,
         low=0.001,
         high=2.0,
         doc="Distance by which improvement rounds move poses (m); halved every two rounds",
@@ -102,7 +111,7 @@ class PlannerSettings:
         3.0, low=0.05, high=50.0, doc="Acceleration of turns in place (rad/s^2)"
     )
     improvement_rounds: int = bounded(
-        12, low=0, high=50, doc="Number of improvement searches after the first plan"
+        20, low=0, high=50, doc="Number of improvement searches after the first plan"
     )
     max_preemptive: int = bounded(
         8, low=0, high=100, doc="Maximum number of pre-emptive pushes that are tried"

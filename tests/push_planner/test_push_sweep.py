@@ -124,20 +124,21 @@ def test_robots_that_have_room_behind_keep_the_distance_all_the_way(robot, box):
         poses = random.uniform([-1.4, -0.9, -np.pi], [1.4, 0.9, np.pi], (60, 3))
         side = replace(scene.sides[0], depth=float(random.choice([0.0, 0.05, 0.15])))
         found = scene.rooms(poses, side)
-        shift = np.linspace(0.0, scene.back(side), 24)
-        ways = np.repeat(poses, 24, axis=0)
-        away = np.tile(shift, len(poses))
-        ways[:, 0] -= away * np.cos(ways[:, 2])
-        ways[:, 1] -= away * np.sin(ways[:, 2])
-        exact = body_distance(world, placed(ways, robot.outline)).reshape(-1, 24)
-        turning = points_distance(world, ways.reshape(-1, 24, 3)[:, -1, :2])
-        assert (exact[found].min(axis=1, initial=1.0) >= settings.safety_distance - 1e-9).all()
         # Where it turns, a quarter of that distance besides its own size.
         enough = robot.footprint_radius + 0.25 * settings.safety_distance
-        assert (turning[found] >= enough - 1e-9).all()
         loss = (np.sqrt(2.0) + 0.1) * CELL
-        plenty = (exact.min(axis=1) > settings.safety_distance + loss) & (turning > enough + loss)
-        assert found[plenty].all()
+        may = np.zeros(len(poses), dtype=bool)
+        for back in scene.backs(side):
+            ways = np.repeat(poses, 24, axis=0)
+            away = np.tile(np.linspace(0.0, back, 24), len(poses))
+            ways[:, 0] -= away * np.cos(ways[:, 2])
+            ways[:, 1] -= away * np.sin(ways[:, 2])
+            exact = body_distance(world, placed(ways, robot.outline)).reshape(-1, 24).min(axis=1)
+            turning = points_distance(world, ways.reshape(-1, 24, 3)[:, -1, :2])
+            may |= (exact >= settings.safety_distance - 1e-9) & (turning >= enough - 1e-9)
+            plenty = (exact > settings.safety_distance + loss) & (turning > enough + loss)
+            assert found[plenty].all()
+        assert may[found].all()
         has += found.sum()
         hasnt += (~found).sum()
     assert has > 150 and hasnt > 150

@@ -147,7 +147,9 @@ def test_a_start_that_no_push_leaves_is_named(planner):
     """Beside the right wall and turned a little: every push goes into the wall or starts in it."""
     start, goal = np.array([1.424, -0.135, -2.723]), np.array([-0.7, 0.4, 0.4])
     assert np.isinf(exhaustive(planner, start, goal, 1))
-    with pytest.raises(PlanningFailed, match="no push leads away from the start"):
+    with pytest.raises(
+        PlanningFailed, match=r"no push away from the start .* was found; of \d+ pushes"
+    ):
         planner.solve(start, goal)
 
 

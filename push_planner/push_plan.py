@@ -1,0 +1,72 @@
+"""What planning gives: plans, where it stands, and why there is no plan."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+from push_model.arrays import Array
+from push_model.push_segment import PushSegment
+from push_planner.guide_path import GuidePath
+
+
+class PlanError(IntEnum):
+    """Why there is no plan; the codes of the PlanPush action."""
+
+    NONE = 0
+    INVALID_GOAL = 101
+    OUTSIDE_MAP = 104
+    START_OCCUPIED = 105
+    GOAL_OCCUPIED = 106
+    NO_GUIDE_PATH = 107
+    NO_PUSH_SEQUENCE = 108
+
+
+class PlanningFailed(Exception):
+    """Raised when there is no plan; carries the code."""
+
+    def __init__(self, code: PlanError, message: str) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+@dataclass(frozen=True)
+class PlanStatistics:
+    """How much work a plan took."""
+
+    rrt_iterations: int = 0
+    nodes_expanded: int = 0
+    nodes_generated: int = 0
+    curves_solved: int = 0
+    curves_feasible: int = 0
+    guide_cost: float = 0.0
+    guide_length: float = 0.0
+    guide_clearance: float = 0.0
+    plan_time: float = 0.0
+
+
+@dataclass(frozen=True)
+class PushPlan:
+    """cost [m]: g(q) of (2.10); length [m] of all pushes; clearance [m]; the guide path used.
+
+    goal ``(3,)`` and the segments' poses are of the object's geometric frame, the guide path is of
+    its centre of mass.
+    """
+
+    goal: Array
+    segments: tuple[PushSegment, ...]
+    cost: float
+    clearance: float
+    guide: GuidePath
+    statistics: PlanStatistics
+
+    @property
+    def length(self) -> float:
+        """[m] pushed in all."""
+        return sum(s.length for s in self.segments)
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where planning stands: what it is doing and the best plan so far."""
+
+    stage: str
+    best: PushPlan | None

@@ -1,0 +1,45 @@
+"""Plans through gaps 4 cm wider than the object, out of traps, through doors, among clutter."""
+
+import numpy as np
+import pytest
+
+from benchmarks.plan import attempt, exhaustive
+from benchmarks.plan_problems import problems_of
+from push_model.occupancy import rasterise
+from push_planner import PlannerSettings, PushPlanner
+
+
+def unsolved(kind, robot, box, count, seed):
+    """The problems without a plan that an exhaustive search solves, and how many can be solved."""
+    missed, solvable = [], 0
+    for number, problem in enumerate(problems_of(kind, box, count, seed)):
+        planner = PushPlanner(PlannerSettings(), rasterise(problem.world), robot, box)
+        outcome = attempt(planner, problem.start, problem.goal)
+        if outcome.costs:
+            solvable += 1
+        elif np.isfinite(exhaustive(planner, problem.start, problem.goal, seed)):
+            solvable += 1
+            missed.append((number, outcome.why))
+    return missed, solvable
+
+
+@pytest.mark.parametrize("kind", ["gap", "trap"])
+def test_a_few_hard_problems_have_plans(robot, box, kind):
+    """The first three of a kind that are known to be solvable."""
+    for number, problem in enumerate(problems_of(kind, box, 3, 1)):
+        planner = PushPlanner(PlannerSettings(), rasterise(problem.world), robot, box)
+        plan = planner.solve(problem.start, problem.goal)
+        assert plan.segments[0].object_start == pytest.approx(problem.start, abs=1e-9), number
+        assert plan.segments[-1].object_end == pytest.approx(problem.goal, abs=1e-9), number
+        assert plan.clearance >= planner.settings.safety_distance - 1e-9
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("kind", "count", "part"),
+    [("gap", 100, 0.95), ("trap", 80, 0.98), ("door", 60, 0.98), ("clutter", 60, 0.98)],
+)
+def test_what_an_exhaustive_search_solves_is_solved(robot, box, kind, count, part):
+    missed, solvable = unsolved(kind, robot, box, count, 2)
+    assert solvable > 0.7 * count
+    assert len(missed) <= (1.0 - part) * solvable, missed
