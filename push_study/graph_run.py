@@ -146,7 +146,7 @@ class LockstepRun:
             self.spinner.close()
         self._stack.close()
 
-    def connect(self, limit: float = 20.0) -> None:
+    def connect(self, limit: float = 300.0) -> None:
         """Wait until all parts know each other; nothing moves before."""
         assert self.spinner is not None
         teams = list(self.teams.values())

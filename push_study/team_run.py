@@ -96,6 +96,8 @@ class Outcome:
     error: tuple[float, float]
     trace: TeamTrace
     drawn: Row
+    pushes: int = 0
+    replans: int = 0
 
     @property
     def success(self) -> bool:
@@ -116,6 +118,8 @@ class Outcome:
             "duration_s": self.seconds,
             "planning_cpu_s": self.planning,
             "charged_s": self.charged,
+            "pushes": self.pushes,
+            "replans": self.replans,
             "collision_ticks": self.trace.collision_ticks,
             **self.drawn,
         }
@@ -258,7 +262,18 @@ def _run(
         error = _errors(watcher.trace.now[0], task.goal)
         latency, spread = run.bridge.applied_latency
         drawn = drawn | {"applied_latency_s": latency, "applied_latency_std_s": spread}
-        return Outcome(reached, code, reason, seconds, planning, error, watcher.trace, drawn)
+        return Outcome(
+            reached,
+            code,
+            reason,
+            seconds,
+            planning,
+            error,
+            watcher.trace,
+            drawn,
+            status.pushes,
+            status.replans,
+        )
 
 
 def _errors(pose: Array, goal: Array) -> tuple[float, float]:

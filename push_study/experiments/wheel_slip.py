@@ -48,7 +48,7 @@ from push_study.uncertainty import uncertainty
 
 SCENARIOS = ("wheel-slip",)
 """Where none are named."""
-OPTIONS: dict[str, str] = {}
+OPTIONS = {"uncertainty": "mild"}
 
 CASES = {1: "I: alone", 2: "II: 3 kg box", 3: "III: mu 0.7 believed"}
 OVERRATED = 0.7

@@ -20,6 +20,7 @@ ROOM = EnvironmentSpec((4.0, 3.0), resolution=0.02)
 STARTS = np.array([[-0.9, y, 0.0] for y in (-0.4, 0.0, 0.4)])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scenario", group_goals.SCENARIOS)
 @pytest.mark.parametrize("seed", [24, 26])
 def test_random_goals_are_reached_also_when_a_robot_dies(scenario, seed):
@@ -114,6 +115,7 @@ def test_a_late_answer_changes_nothing():
     assert job.error is JobError.NONE and not job.busy
 
 
+@pytest.mark.long
 def test_a_study_tells_what_was_reached(tmp_path, capsys):
     options = StudyOptions(("open",), 1, 23, tmp_path, world="planar", workers=1)
     summary = run_study("group-goals", options)

@@ -19,8 +19,8 @@ from push_model.kinematics import unicycle_step
 from push_model.occupancy import rasterise
 from push_model.specs import EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
-from push_study.experiments.group_goals import GoalTask, answer, problem
-from push_study.group_world import TICK, GroupWorld
+from push_study.experiments.group_goals import GoalTask, problem
+from push_study.group_world import TICK, GroupWorld, answer
 from push_study.uncertainty import uncertainty
 
 ROBOT = load_robot("epuck_ring")

@@ -15,8 +15,9 @@ from push_model.occupancy import rasterise
 from push_model.settings import from_mapping
 from push_model.specs import EnvironmentSpec, ObjectSpec
 from push_scenario.bodies import load_object, load_robot
-from push_study.experiments.group_goals import answer, plate, scattered
-from push_study.group_world import GroupWorld
+from push_study.experiments.group_goals import plate
+from push_study.group_world import GroupWorld, answer
+from push_study.rooms import scattered
 from push_study.uncertainty import uncertainty
 
 ROBOT = load_robot("epuck_ring")
@@ -53,7 +54,7 @@ def turned(item, count, turn, seed):
     start, grid = np.array([0.0, 0.0, random.uniform(-3.0, 3.0)]), rasterise(ROOM)
     outline = se2.transform(start, item.geometry.outline)
     radius = ROBOT.footprint_radius
-    robots = scattered(random, count, FreeSpace(grid), outline, radius, SIZE)
+    robots = scattered(random, count, FreeSpace(grid), outline, radius, gap=0.03)
     goal = np.array([0.0, 0.0, se2.wrap(float(start[2]) + turn)])
     planner, job = StepPlanner(grid, item, ROBOT), GroupJob(item, ROBOT, count)
     job.begin(goal)

@@ -44,6 +44,7 @@ def test_impossible_tasks_are_refused_with_the_reason():
         GraspSelector(item, swaying, 3, 0.05).select(40, 1)
 
 
+@pytest.mark.long
 def test_selected_grasps_push_where_random_ones_fail():
     """Six tasks on the ellipse in the planar world: all selected grasps succeed, to a tenth of a
     millimetre; of random ones many do not."""

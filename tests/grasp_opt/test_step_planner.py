@@ -37,6 +37,7 @@ def drive(batches, robots, watch, limit=300.0):
     return robots
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scenario", ["open", "obstacles"])
 def test_robots_come_to_their_places_without_touching_anything(scenario):
     """Random worlds, plates and numbers of robots; the moves driven as they are told."""
@@ -110,6 +111,7 @@ def test_who_does_not_push_goes_out_of_the_way():
             assert distance(outline, ended[i, None, :2])[0] > RADIUS
 
 
+@pytest.mark.long
 def test_trajectories_that_cannot_be_pushed_are_refused():
     """A turn on the spot by two robots on a triangle, which have no couple; a way into a wall."""
     planner = StepPlanner(OPEN, plate(3), ROBOT)

@@ -53,6 +53,7 @@ def guides_or_refusal(planner, start, goal):
         return [], refusal
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("tilt", "allowance"), [(0.0, 2.0 * CELL), (0.35, 2.0 * 2**0.5 * CELL)])
 def test_gaps_of_any_width_are_decided_right(robot, box, tilt, allowance):
     """120 walls, one gap each at a random place. The map may take off a cell on either side, or a

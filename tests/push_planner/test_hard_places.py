@@ -23,6 +23,7 @@ def unsolved(kind, robot, box, count, seed):
     return missed, solvable
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["gap", "trap"])
 def test_a_few_hard_problems_have_plans(robot, box, kind):
     """The first three of a kind that are known to be solvable."""

@@ -40,6 +40,7 @@ def exact(planner, segment):
     return way, item, body_distance(WORLD, placed(robots, planner.scene.robot.outline))
 
 
+@pytest.mark.long
 def test_it_keeps_what_it_has_and_then_the_safety_distance(robot, box):
     """60 starts: every push that a plan begins with, and every pre-emptive one."""
     settings = PlannerSettings(**FEW)

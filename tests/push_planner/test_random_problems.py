@@ -37,6 +37,7 @@ def outcomes(planner):
     return [(s, g, *attempt(planner, s, g)) for s, g in problems(planner, COUNT, 3)]
 
 
+@pytest.mark.long
 def test_no_plan_is_worse_than_an_earlier_one(outcomes):
     improved = 0
     for _, _, plans, _ in outcomes:
@@ -104,6 +105,7 @@ def test_equal_seeds_give_equal_plans_to_the_bit(outcomes, planner, scenario, ro
             assert np.array_equal(a.trajectory.pose, b.trajectory.pose)
 
 
+@pytest.mark.long
 def test_clutter(robot, box):
     """Among boxes and circles, many of twelve problems have a plan, the others a reason. What an
     exhaustive search makes of those is for ``planar-push bench plan``."""

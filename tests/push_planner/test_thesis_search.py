@@ -62,6 +62,7 @@ def test_the_printed_one_fares_as_the_thesis_tells_in_environment_2():
     assert found["env2-target2"] == found["env2-target3"] == 0
 
 
+@pytest.mark.long
 def test_its_plans_are_chains_of_stable_and_free_pushes_that_the_default_finds_too():
     scenario = load_scenario("env3-target1")
     printed, default = planner_of(scenario, PRINTED), planner_of(scenario, PlannerSettings())

@@ -59,6 +59,7 @@ def deepest(outline, other):
     return max(depths)
 
 
+@pytest.mark.long
 def test_shoves_end_before_anything_and_nowhere_short_of_it():
     """200 shoves of a box that a robot may be pressing on: into robots, pillar and walls."""
     random = np.random.default_rng(4)

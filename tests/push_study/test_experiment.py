@@ -33,6 +33,7 @@ MEASURES = {
 }
 
 
+@pytest.mark.long
 def test_experiment_leaves_summary_traces_plot_bag_and_report(room, tmp_path, capsys):
     out = tmp_path / "out"
     options = StudyOptions((room,), 1, 5, out, workers=1)
@@ -59,6 +60,7 @@ def test_experiment_leaves_summary_traces_plot_bag_and_report(room, tmp_path, ca
         run_study("single-robot", StudyOptions((room,), 1, 6, out, workers=1))
 
 
+@pytest.mark.long
 def test_rows_of_a_worker_that_stays_equal_those_of_fresh_processes(tmp_path):
     """To the bit; the time that planning took is the only thing that may differ."""
     tasks = [SingleRobotTask("short", seed, str(tmp_path / "pool")) for seed in (5, 6)]

@@ -28,6 +28,7 @@ def drawn(task):
     return item, grasp_study.draw(task, item, trajectory), trajectory
 
 
+@pytest.mark.long
 def test_what_the_test_lets_pass_is_transported_and_what_it_does_not_slips():
     """60 pushes in the planar world, far enough from the boundary to be certain."""
     certain = held = 0
@@ -45,6 +46,7 @@ def test_what_the_test_lets_pass_is_transported_and_what_it_does_not_slips():
     assert certain > 30 and 0.2 < held / certain < 0.9
 
 
+@pytest.mark.long
 def test_both_worlds_say_the_same_of_a_grasp():
     agree = total = 0
     for task in some(8, "planar", 5):
@@ -120,6 +122,7 @@ def test_cross_validation_finds_what_is_there_and_nothing_else():
     assert np.isnan(cross_validated(x[:20], y[:20]).r)
 
 
+@pytest.mark.long
 def test_a_slice_of_the_study_prints_its_tables(tmp_path, capsys):
     options = StudyOptions(
         ("plate_hexagon", "plate_ellipse"), 4, 2, tmp_path / "s", workers=1, world="planar"

@@ -27,6 +27,7 @@ def test_every_task_is_tracked_in_the_planar_world(tmp_path, scenario, robots):
         assert row["position_error_m"] < 5e-3 and row["orientation_error_rad"] < 0.02
 
 
+@pytest.mark.long
 def test_a_push_in_pybullet_with_noise_is_tracked(tmp_path):
     row = group_tracking.trial(task(tmp_path, "bend", 2, world="pybullet"))
     assert row["success"] and not row["collision"]
@@ -52,6 +53,7 @@ def test_placements_are_what_they_are_called():
     assert np.linalg.norm(best.forces, axis=2).max() <= 0.9 * most + 1e-9
 
 
+@pytest.mark.long
 def test_a_study_ends_with_a_table_and_plots_and_refuses_unknown_trajectories(tmp_path, capsys):
     options = StudyOptions(("wave",), 1, 1, tmp_path / "study", world="planar", workers=1)
     summary = run_study("group-tracking", options)

@@ -209,6 +209,7 @@ def test_a_statistic_does_not_hide_a_measure():
     assert known({"a": (np.float64(1.0), math.inf, np.int64(2))}) == {"a": [1.0, None, 2]}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("ticks", "success"), [(0, True), (1, False), (200, False)])
 def test_a_goal_that_is_reached_with_a_collision_is_no_success(
     ticks, success, tmp_path, monkeypatch

@@ -80,6 +80,7 @@ def test_equal_seeds_give_equal_runs(tmp_path, method):
     assert np.hypot(*(ways[-1, 1:, :2] - ways[0, 1:, :2]).T).max() > 0.3  # they move
 
 
+@pytest.mark.long
 def test_a_slice_of_the_experiment_prints_its_table(tmp_path, capsys):
     options = StudyOptions(("transport_triangle",), 1, 1, tmp_path, world="planar")
     tasks = swarm_rivals.tasks(options)

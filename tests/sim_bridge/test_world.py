@@ -88,6 +88,7 @@ def push_along_arc(robot, box, mu, factor, degrees=60.0, speed=0.05):
         return 1e3 * abs(se2.between(poses["r"], poses["b"])[1] - first[1])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mu", [0.2, 0.5])
 def test_onset_of_slip_is_at_the_stable_push_limit(robot, box, mu):
     assert push_along_arc(robot, box, mu, 1.1) < 1.0

@@ -40,6 +40,7 @@ def say(team, words):
             agent.hear(word)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("lost", "within"), [(0.0, 0.02), (0.1, 0.05), (0.4, 0.1)])
 def test_they_agree_on_the_mean_while_they_move_and_messages_are_lost(lost, within):
     """Eight draws of a swarm of fifteen of which nobody hears all; everybody goes its own way."""
@@ -145,6 +146,7 @@ def test_words_and_targets_go_through_their_messages():
         agent_state_from_ros(SwarmAgentState(robot="e1"))
 
 
+@pytest.mark.long
 def test_they_bring_an_object_to_its_pose_with_messages_lost(tmp_path):
     """A slice of the experiment swarm-decentralised."""
     task = MapTask(

@@ -102,6 +102,7 @@ def test_in_the_open_it_goes_where_it_is_wanted():
         assert motion[:2] @ wanted[:2] > 0.7 * np.hypot(*motion[:2]) * 0.05
 
 
+@pytest.mark.long
 def test_a_triangle_that_lies_flat_on_a_wall_comes_off_it():
     """And stays there where nothing leads it off."""
     room = EnvironmentSpec((2.6, 2.0), (BoxSpec((0.0, -0.8), (2.6, 0.4)),), resolution=0.02)

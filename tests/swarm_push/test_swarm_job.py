@@ -69,6 +69,7 @@ def test_random_poses_are_reached(seed):
     assert abs(se2.wrap(pose[2] - target[2])) < 0.05
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("law", ["crescent", "thesis"])
 def test_targets_in_a_row_are_reached_by_both_laws(law):
     # The printed law may take minutes to get behind the object.

@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from push_study.swarm_run import starts
 
 from push_model import se2
 from push_model.jobs import JobError
@@ -16,6 +15,7 @@ from push_model.shape_specs import PolygonShape
 from push_model.specs import EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
 from push_study.group_world import GroupWorld
+from push_study.rooms import around as starts
 from push_study.uncertainty import uncertainty
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
 

@@ -143,6 +143,7 @@ def test_without_a_way_there_is_no_track_and_the_job_says_so():
     assert "no way" in job.reason
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "item", "turned", "seed"),
     [

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 from geometry_msgs.msg import TwistStamped
 from std_msgs.msg import Header
 
@@ -36,6 +37,7 @@ def agents(run):
     return [n for n in run.spinner.nodes if n.get_name().startswith("agent_")]
 
 
+@pytest.mark.long
 def test_they_stand_when_nobody_tells_them_a_target_any_more_and_go_on_when_somebody_does():
     """Row 11: the swarm's own node is gone."""
     with running(**decentralised()) as run:
@@ -53,6 +55,7 @@ def test_they_stand_when_nobody_tells_them_a_target_any_more_and_go_on_when_some
         assert max(speed for when, speed in told if when > gone + 3.2) > 0.0
 
 
+@pytest.mark.long
 def test_words_and_targets_that_are_none_are_refused():
     """Rows 1 and 21."""
     with running(**decentralised()) as run:
@@ -75,6 +78,7 @@ def test_words_and_targets_that_are_none_are_refused():
         run.supervisor.end_job(JobError.CANCELED, "enough")
 
 
+@pytest.mark.long
 def test_a_pose_is_reached_although_words_get_lost_the_object_is_not_seen_and_a_robot_dies():
     """Rows 7 and 14."""
     events = [

@@ -20,6 +20,7 @@ def scenario(outline, start, goal):
     return scenario_from_mapping(values, "concave", "test")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("outline", "seed"), [(L, 1), (T, 2), (SLIM, 4)], ids=["L", "T", "slim"])
 def test_they_reach_their_goals(outline, seed):
     random = np.random.default_rng(seed)
@@ -28,6 +29,7 @@ def test_they_reach_their_goals(outline, seed):
     assert len(set(reach(outline, start, goal))) >= 2  # the robot went round it to another side
 
 
+@pytest.mark.long
 def test_pushes_on_the_floor_of_a_recess_and_out_of_it_in_between(robot):
     (recess,) = (s.index for s in pushable_sides(item_of(U).geometry, robot) if s.depth > 0.0)
     sides = reach(U, [-0.4, 0.0, np.pi / 2], [0.3, 0.3, -np.pi / 2])

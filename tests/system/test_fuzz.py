@@ -71,6 +71,7 @@ def spin(run, seconds):
     run.spin_until(lambda: run.bridge.time >= end, seconds, 5.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("busy", [False, True])
 @pytest.mark.parametrize("seed", range(2))
 def test_random_messages_and_random_bytes_crash_nothing(run, seed, busy):

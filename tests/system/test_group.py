@@ -115,6 +115,7 @@ def test_a_trajectory_is_followed_and_one_that_begins_elsewhere_refused(run):
     assert again.error_code == JobError.INVALID_GOAL and "from where it begins" in again.error_msg
 
 
+@pytest.mark.long
 def test_on_a_trajectory_that_no_placement_holds_the_robots_change_places(run):
     """Ahead, and then aside with the same heading: nobody can push both ways at once."""
     first = screw(np.array([0.0, 0.0, -1.5708]), np.array([0.0, 0.25, 0.0]), 0.05, 0.05, 0.2)
@@ -142,6 +143,7 @@ def test_what_cannot_be_held_is_refused_before_anybody_moves():
         assert run.observer.trace.robot[-1] == pytest.approx(before, abs=1e-3)
 
 
+@pytest.mark.long
 def test_a_robot_that_dies_is_left_and_the_others_go_on():
     events = [{"kind": "kill", "at": 22.0, "robot": "e1"}]
     with running(events=events) as run:
@@ -164,6 +166,7 @@ def test_a_new_goal_replaces_the_old_and_cancel_stops_all(run):
     assert error(run, second)[0] < 5e-3
 
 
+@pytest.mark.long
 def test_the_scenario_of_the_demo_is_reached():
     scenario = load_scenario("group-ellipse").settings("bridge", world="planar")
     with LockstepRun(scenario, system="group", quiet=True) as run:

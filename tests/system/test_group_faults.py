@@ -54,6 +54,7 @@ def test_when_the_object_is_not_seen_all_stand_and_go_on_when_it_is():
         assert run.supervisor.method.job.dead == () and run.supervisor.method.job.replans == 0
 
 
+@pytest.mark.long
 def test_an_object_that_somebody_moves_is_noticed_and_brought_all_the_same():
     """Row 16."""
     events = [{"kind": "displace", "at": 24.0, "body": "plate", "by": [0.12, 0.1, 0.4]}]

@@ -139,6 +139,7 @@ def test_a_new_action_goal_replaces_the_one_under_way_and_can_be_canceled(jobs):
     assert np.hypot(*(jobs.run.observer.trace.robot[-1] - before)[:2]) < 1e-3
 
 
+@pytest.mark.long
 def test_a_goal_on_the_topic_replaces_an_action_and_is_reached(jobs):
     first = jobs.send(jobs.goal + [0.1, 0.0, 0.0])
     jobs.pushing()
@@ -149,6 +150,7 @@ def test_a_goal_on_the_topic_replaces_an_action_and_is_reached(jobs):
     assert jobs.run.observer.trace.object[-1][:2] == pytest.approx(jobs.goal[:2], abs=0.02)
 
 
+@pytest.mark.long
 def test_an_action_goal_takes_over_from_a_goal_on_the_topic(jobs):
     jobs.run.observer.send_goal(jobs.goal + [0.1, 0.0, 0.0])
     jobs.pushing()
@@ -167,6 +169,7 @@ def test_poses_that_are_silent_for_long_end_a_goal_as_such(jobs):
     """FAULTS 7: the supervisor says that it has no poses, not that it cannot plan."""
     supervisor = jobs.run.supervisor
     supervisor._apply(type(supervisor.settings)(pose_timeout=0.3, node_timeout=0.6))
+    supervisor._poses.clock.lockstep = False  # live, where silence counts
     jobs.run.bridge.running = False
     assert jobs.run.spinner.until(lambda: supervisor._pose("box") is None, 5.0)
     jobs.run.observer.send_goal(jobs.goal)
@@ -174,6 +177,7 @@ def test_poses_that_are_silent_for_long_end_a_goal_as_such(jobs):
         lambda: jobs.state.error_code == MoveObject.Result.POSES_STALE, 10.0
     )
     assert "no poses" in jobs.state.reason
+    supervisor._poses.clock.lockstep = True
     jobs.run.bridge.start()
     assert jobs.run.reach(jobs.goal).error_code == 0
 
@@ -185,6 +189,7 @@ def pause(jobs, on):
     assert jobs.run.spinner.until(done.done, 5.0) and done.result().success
 
 
+@pytest.mark.long
 def test_a_pause_in_mid_push_stands_still_and_goes_on(jobs):
     """FAULTS 12 and 24: longer than anybody waits for poses; nobody answers late, nothing is
     stopped by force, the goal is reached."""
@@ -199,6 +204,7 @@ def test_a_pause_in_mid_push_stands_still_and_goes_on(jobs):
     assert jobs.run.bridge.unanswered == 0 and jobs.state.replans == 0
 
 
+@pytest.mark.long
 def test_another_scenario_with_other_names_can_be_loaded(jobs, tmp_path):
     text = (config_directory() / "scenarios" / "short.yaml").read_text()
     path = tmp_path / "other.yaml"

@@ -148,6 +148,7 @@ class Outsider(Node):
         self.cancel = self.create_client(Trigger, "/cancel")
 
 
+@pytest.mark.long
 def test_standard_messages_are_enough():
     scenario = load_scenario("short")
     outsiders = []
@@ -338,6 +339,7 @@ def test_frozen_poses_end_the_push(short):
     ), short.observer.trace.states
 
 
+@pytest.mark.long
 def test_object_taken_away_is_noticed_and_replanned(short):
     """FAULTS 16: moved by hand in mid-push; the goal is reached all the same."""
     pushing(short)
@@ -347,6 +349,7 @@ def test_object_taken_away_is_noticed_and_replanned(short):
     assert final_errors(short.observer.trace, short.scenario.goal)[0] < 0.02
 
 
+@pytest.mark.long
 def test_object_moved_before_the_push_is_noticed(short):
     short.observer.send_goal(short.scenario.goal)
     assert short.spin_until(

@@ -48,6 +48,7 @@ def standstill(bag, sign, limit):
     return table[-1, 0] - last, float(np.hypot(*np.ptp(rest[:, 1:], axis=0)))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("victim", "respawn"), [("controller", True), ("controller", False), ("supervisor", False)]
 )
@@ -90,6 +91,7 @@ def test_killed_node(domain, victim, respawn, tmp_path):
     assert {"/poses", "/epuck1/cmd_vel", "/job_state"} <= topics
 
 
+@pytest.mark.long
 def test_a_planner_killed_at_work_is_asked_again(domain, tmp_path):
     """FAULTS 11: it dies with the request; the one started in its place gets it anew."""
     said = []
@@ -111,6 +113,7 @@ def test_a_planner_killed_at_work_is_asked_again(domain, tmp_path):
     assert any("planner died (signal 9)" in text for text in said)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("seed", range(2))
 def test_signals_at_random_moments(domain, number, seed, tmp_path):
@@ -134,6 +137,7 @@ def test_signals_at_random_moments(domain, number, seed, tmp_path):
         assert_closed(tmp_path / "bag")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_signals_end_a_demo(domain, number, tmp_path):
     """FAULTS 18, in the middle of a push."""
@@ -154,6 +158,7 @@ def test_signals_end_a_demo(domain, number, tmp_path):
     assert_closed(tmp_path / "demo" / "bag")
 
 
+@pytest.mark.long
 def test_a_recorder_that_is_started_again_writes_beside_the_first_bag(domain, tmp_path):
     said = []
     bag = tmp_path / "b"
@@ -171,6 +176,7 @@ def test_a_recorder_that_is_started_again_writes_beside_the_first_bag(domain, tm
     assert_closed(tmp_path / "b-2")
 
 
+@pytest.mark.long
 def test_a_node_that_dies_again_and_again_is_given_up(domain, tmp_path):
     said = []
     words = ["--ros-args", "-p", "scenario:=atlantis"]
@@ -198,6 +204,7 @@ def test_a_wrong_parameter_on_the_command_line_is_an_error_not_a_traceback(domai
     assert "real_time_factor" in done.stderr
 
 
+@pytest.mark.long
 def test_demo_ends_with_bag_pictures_and_report(domain, tmp_path):
     process = command(
         *("demo", "--scenario", "short", "--factor", "3", "--out", str(tmp_path / "demo")),
@@ -261,6 +268,7 @@ def test_goal_waits_for_an_owner_that_is_frozen_and_says_when_it_was_restarted(d
     assert any("supervisor died (signal 9)" in text for text in said)
 
 
+@pytest.mark.long
 def test_goal_follows_its_own_goal(domain, tmp_path):
     """A stranger's goals, refused or taken, are not mistaken for its own."""
     launcher = launcher_of(tmp_path / "s", factor=3.0)

@@ -73,6 +73,7 @@ def test_a_script_starts_a_suite_and_is_told_how_it_ended(domain, tmp_path, capf
     assert out == "" and err == ""  # silent unless asked
 
 
+@pytest.mark.long
 def test_a_suite_in_a_given_context_ends_with_a_dead_node(domain):
     context = rclpy.Context()
     rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
@@ -103,6 +104,7 @@ def test_what_a_dead_node_said_is_quoted(domain, monkeypatch):
         pass
 
 
+@pytest.mark.long
 def test_two_teams_side_by_side_in_one_world(domain, tmp_path):
     """Done-when 3: two single-robot systems in one graph, neither touches the other."""
     with Suite("two-singles", record=tmp_path / "bag", namespace="a", factor=2.0) as suite:
@@ -119,6 +121,7 @@ def test_two_teams_side_by_side_in_one_world(domain, tmp_path):
         assert "PUSHING" in [s.name for s in job.states] and result.replans == 0
 
 
+@pytest.mark.long
 def test_two_suites_in_two_namespaces_of_one_domain(domain, tmp_path):
     """Two bridges, two of everything: each hears its own."""
     with contextlib.ExitStack() as stack:
@@ -141,6 +144,7 @@ def test_two_suites_in_two_namespaces_of_one_domain(domain, tmp_path):
         assert final_error(contents, contents.jobs[f"/{name}/"]).position < 0.02
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "words",
     [

@@ -115,6 +115,7 @@ def run():
         yield run
 
 
+@pytest.mark.long
 def test_what_is_driven_is_the_plan_that_was_published_last(run):
     """Random goals one after the other, each from where the last one ended."""
     random = np.random.default_rng(8)
@@ -138,6 +139,7 @@ def same(segment, said):
     ]
 
 
+@pytest.mark.long
 def test_a_pre_emptive_push_is_part_of_the_plan_that_is_driven():
     """Section 2.5, S2: no direct plan, so a push that leads away comes first, on the topic too."""
     scenario = load_scenario("short")
@@ -155,6 +157,7 @@ def test_a_pre_emptive_push_is_part_of_the_plan_that_is_driven():
             same(segment, said)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("way", ["cancel", "new goal", "new supervisor"])
 def test_a_robot_at_the_object_loses_no_planning_round(run, way):
     """It backs off before it plans, however it came to stand there."""
@@ -230,6 +233,7 @@ def test_the_goal_that_is_pursued_changes_nothing_in_each_state(run):
     assert codes == [0] + [JobError.PREEMPTED] * (2 * len(RUNNING) - 1)
 
 
+@pytest.mark.long
 def test_of_a_flood_of_goals_the_last_one_wins(run):
     """FAULTS 28: in the middle of a push, forty goals at once, by topic and by action."""
     run.by_topic(run.goal)
@@ -248,6 +252,7 @@ def test_of_a_flood_of_goals_the_last_one_wins(run):
 WALL = EnvironmentSpec((3.0, 2.0), boxes=(BoxSpec((-0.15, 0.15), (0.06, 0.5)),))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["PLANNING", "POSITIONING", "PUSHING"])
 def test_a_new_map_is_minded_at_once(run, name):
     """A wall appears across the way; the plan that is driven knows it."""
@@ -301,6 +306,7 @@ def test_a_world_with_other_bodies_ends_the_job(run):
     run.reached(run.goal)
 
 
+@pytest.mark.long
 def test_a_pause_in_any_state_freezes_the_job(run):
     """FAULTS 24: longer than the patience with anybody."""
     supervisor = run.run.supervisor
@@ -345,6 +351,7 @@ def test_a_body_that_stays_on_the_goal_is_given_up_on():
         assert "overlap" in state.reason
 
 
+@pytest.mark.long
 def test_a_body_in_the_way_is_gone_round():
     """Neither object nor robot touches it."""
     with runs(crowded([-0.15, 0.02, 0.4])) as run:

@@ -76,6 +76,7 @@ def move(run, x, y, theta=(), limit=400.0, feedback=None):
     return answer.result().result
 
 
+@pytest.mark.long
 def test_targets_in_a_row_are_reached_without_headings(run):
     told = []
     result = move(run, [0.9, 0.0], [0.5, -0.5], feedback=told)
@@ -123,6 +124,7 @@ BEYOND = [1.4, 0.0, 0.0]
 WALL = {"size": [4.0, 3.0], "boxes": [{"centre": [0.6, -0.5], "size": [0.2, 2.0]}]}
 
 
+@pytest.mark.long
 def test_an_object_is_brought_round_a_wall():
     with running(environment=WALL, goal=[1.3, -0.8, 0.5]) as run:
         run.start()
@@ -134,7 +136,7 @@ def test_an_object_is_brought_round_a_wall():
         assert np.array(ways)[:, 1].max() > 0.6  # there is no other way
 
 
-def test_goals_in_walls_or_without_a_way_are_refused_or_given_up():
+def test_goals_in_walls_or_without_a_way_are_refused():
     with running(environment=WALL, goal=BEYOND) as run:
         run.start()
         run.teams[""].send_goal(np.array([0.6, -0.5, 0.0]))
@@ -143,9 +145,10 @@ def test_goals_in_walls_or_without_a_way_are_refused_or_given_up():
     shut = {"size": [4.0, 3.0], "boxes": [{"centre": [0.8, 0.0], "size": [0.2, 2.6]}]}
     with running(environment=shut, goal=BEYOND) as run:
         run.start()
-        state = run.reach(np.array([1.4, 0.0, 0.0]))
-        assert state is not None and state.error_code == JobError.PLANNING_FAILED
-        assert "no way" in state.reason
+        run.teams[""].send_goal(np.array([1.4, 0.0, 0.0]))
+        assert run.spin_until(lambda: run.teams[""].refused, 5.0)
+        assert run.observer.state.refusal_code == JobError.PLANNING_FAILED
+        assert "no way" in run.observer.state.refusal
 
 
 def test_the_printed_law_refuses_walls():
@@ -181,6 +184,7 @@ def decentralised(**agents):
     return {"parameters": {**VALUES["parameters"], "swarm": swarm}, "robots": robots}
 
 
+@pytest.mark.long
 def test_they_stand_when_a_job_is_canceled_and_go_on_with_the_next():
     with running(**decentralised()) as run:
         run.start()

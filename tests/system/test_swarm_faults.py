@@ -33,6 +33,7 @@ def run():
         yield started
 
 
+@pytest.mark.long
 def test_when_the_object_is_not_seen_all_stand_and_go_on_when_it_is():
     """Row 7. Nobody is taken for dead."""
     events = [{"kind": "drop_poses", "at": 12.0, "bodies": ["box"], "duration": 4.0}]
@@ -57,6 +58,7 @@ def test_a_robot_that_is_not_seen_stands_and_the_others_go_on():
         assert not {"e1", "e2"} & set(run.supervisor.method.job.taking_part)
 
 
+@pytest.mark.long
 def test_an_object_that_somebody_moves_is_brought_all_the_same():
     """Row 16."""
     events = [{"kind": "displace", "at": 12.0, "body": "box", "by": [0.1, 0.3, 0.4]}]
@@ -67,6 +69,7 @@ def test_an_object_that_somebody_moves_is_brought_all_the_same():
         assert error(run)[0] < 0.03
 
 
+@pytest.mark.long
 def test_a_reset_of_the_world_ends_the_job_and_the_next_goal_is_reached(run):
     """Row 12."""
     run.teams[""].send_goal(GOAL)

@@ -125,6 +125,8 @@ def test_it_stands_when(run, how):
         run.spin(0.8)
         assert run.torques
         handle.cancel_goal_async()
+    else:
+        run.me.destroy_publisher(run.heartbeat)  # in lockstep the sender is lost when it is gone
     assert run.spinner.until(answer.done, 30.0)
     expected = CODES.CANCELED if how == "cancel" else CODES.PREEMPTED
     assert answer.result().result.error_code == expected

@@ -9,6 +9,7 @@ from push_study.graph_run import LockstepRun
 from push_study.observer import final_errors
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("namespace", ["", "lab/a"])
 def test_two_teams_reach_their_goals_and_touch_nobody_else(namespace):
     scenario = load_scenario("two-singles")
