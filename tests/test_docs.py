@@ -15,6 +15,7 @@ from grasp_opt.step_planner import StepSettings
 from push_model.jobs import JobError
 from push_mpc.settings import ControllerSettings, MpcSettings, TrackerSettings
 from push_mpc.task import TrackError
+from push_mpc.torque_friction import FrictionTrustSettings
 from push_mpc.torque_tracker import TorqueTrackerSettings
 from push_mpc.wheel_slip_nmpc import WheelSlipSettings
 from push_planner import PlanError, PlannerSettings
@@ -102,7 +103,11 @@ SECTIONS = {
     "planner": {"": PlannerSettings},
     "controller": {"": ControllerSettings, "mpc": MpcSettings, "tracker": TrackerSettings},
     "supervisor": {"": SupervisorSettings},
-    "torque_controller": {"nmpc": WheelSlipSettings, "tracker": TorqueTrackerSettings},
+    "torque_controller": {
+        "nmpc": WheelSlipSettings,
+        "tracker": TorqueTrackerSettings,
+        "friction": FrictionTrustSettings,
+    },
     "group": {"": GroupJobSettings, "control": GroupControlSettings, "push": GroupPushSettings},
     "optimizer": {"": StepSettings},
     "swarm": {"": SwarmJobSettings, "law": LawSettings, "agents": AgentSettings},
