@@ -13,7 +13,7 @@ CORES = tests/push_model tests/push_scenario tests/push_estimation tests/push_pl
   tests/push_supervisor tests/push_bringup tests/planar_push tests/push_record \
   tests/grasp_opt tests/swarm_push
 
-.PHONY: install demo test test-long test-fast coverage lint clean
+.PHONY: install demo test test-long test-studies test-fast coverage lint clean
 install: $(STAMP)
 
 $(VENV)/bin/python:
@@ -43,7 +43,7 @@ demo: $(STAMP)
 # What starts processes in real time runs alone; the rest side by side, each in its own domain; nodes
 # wait for each other now and then, so there are more workers than cores.
 test: lint
-	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not live and not long"
+	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not live and not long and not study"
 	$(BIN)/python -m pytest -m "live and not long"
 
 # Slow slices: whole jobs in PyBullet, seeded samples of the studies, faults in real time.
@@ -51,12 +51,16 @@ test-long: $(STAMP)
 	$(BIN)/python -m pytest -n 3 --dist worksteal -m "long and not live"
 	$(BIN)/python -m pytest -m "long and live"
 
+# Whole samples of claims, e.g. hundreds of random problems: hours.
+test-studies: $(STAMP)
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m study
+
 # The cores: no nodes, no simulation of whole jobs.
 test-fast: $(STAMP)
-	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not live and not long" --durations=5 $(CORES)
+	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not live and not long and not study" --durations=5 $(CORES)
 
 coverage: $(STAMP)
-	$(BIN)/python -m pytest -n 2 -m "not live" --durations=0 --cov --cov-branch --cov-report=term
+	$(BIN)/python -m pytest -n 2 -m "not live and not study" --durations=0 --cov --cov-branch --cov-report=term
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

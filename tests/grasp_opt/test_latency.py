@@ -145,7 +145,7 @@ def test_a_declared_latency_costs_no_accuracy(case):
     assert errors(case, 0.1, 1, declared=0.0)[0] > 2.0 * base
 
 
-@pytest.mark.long
+@pytest.mark.study
 def test_a_declared_latency_costs_no_accuracy_over_many_seeds():
     for case in CASES:
         found = {
@@ -177,7 +177,7 @@ def job(sides, count, seed, delay):
         return float(np.hypot(*off[:2])), running.replans, world.time
 
 
-@pytest.mark.long
+@pytest.mark.study
 @pytest.mark.parametrize("seed", range(6))
 def test_whole_jobs_end_as_well_under_a_declared_latency(seed):
     sides, count = (0, 4, 5, 6, 7, 8)[seed], 3 + seed % 3

@@ -76,7 +76,7 @@ def test_three_robots_turn_a_pentagon_by_half_a_turn():
     assert job.pushes == 1 and away < 5e-3 and askew < 0.03
 
 
-@pytest.mark.long
+@pytest.mark.study
 def test_random_pure_turns_are_reached():
     """Fifty of 0.5 rad to half a turn either way; nothing is left out, refusals count as missed."""
     reached, missed = 0, []

@@ -100,7 +100,7 @@ def test_ways_keep_the_room_that_was_asked_for():
     assert tried > 20 and found >= 0.9 * tried and bent > 8
 
 
-@pytest.mark.long
+@pytest.mark.study
 def test_ways_keep_the_room_that_was_asked_for_on_many_maps():
     found, bent, tried = check(range(60, 1000))
     assert tried > 300 and found >= 0.9 * tried and bent > 120

@@ -35,7 +35,7 @@ def test_a_few_hard_problems_have_plans(robot, box, kind):
         assert plan.clearance >= planner.settings.safety_distance - 1e-9
 
 
-@pytest.mark.long
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("kind", "count", "part"),
     [("gap", 100, 0.95), ("trap", 80, 0.98), ("door", 60, 0.98), ("clutter", 60, 0.98)],

@@ -31,7 +31,7 @@ def test_the_line_is_tracked_with_the_constraint_and_the_object_lost_without(tmp
     assert lost["final_error_m"] > 0.05
 
 
-@pytest.mark.long
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("variant", "uncertainty"),
     [("(2.57)", "mild"), ("(2.53), our gains", "hard"), ("none, our gains", "hard")],
@@ -166,7 +166,7 @@ def test_goals_in_a_row_are_reached_without_a_reset(tmp_path, capsys):
     assert np.ptp(goals[:, 0]) > 2.3 and np.ptp(goals[:, 1]) > 1.3
 
 
-@pytest.mark.long
+@pytest.mark.study
 def test_the_constraint_decides_whether_three_pushes_are_enough(tmp_path, capsys):
     """With our gains. With (2.53) the object stays where it is at the bumper; without it slides."""
     rows, tasks = {}, []

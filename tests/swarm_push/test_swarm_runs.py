@@ -68,7 +68,7 @@ def test_five_millimetres_are_reached(seed):
     assert reaches(seed, 5e-3)
 
 
-@pytest.mark.long
+@pytest.mark.study
 def test_five_millimetres_are_reached_in_95_of_100():
     done = [reaches(seed, 5e-3) for seed in range(50)]
     assert np.mean(done) >= 0.95, [k for k in range(50) if not done[k]]
@@ -79,7 +79,7 @@ def test_no_live_robot_is_declared_dead_where_the_outline_is_off(seed, scale):
     assert not run(seed, 25.0, scale)[1]
 
 
-@pytest.mark.long
+@pytest.mark.study
 @pytest.mark.parametrize("robot", ["epuck_ring", "disc"])
 def test_no_live_robot_is_declared_dead_in_100_runs(robot):
     random = np.random.default_rng(8)

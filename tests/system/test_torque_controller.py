@@ -237,7 +237,7 @@ def test_the_constraint_takes_the_slip_of_the_bends_away(tmp_path, capsys):
     assert "from 4.0 s on, before the first bend; uncertainty: mild" in capsys.readouterr().out
 
 
-@pytest.mark.long
+@pytest.mark.study
 @pytest.mark.parametrize("case", [1, 2, 3])
 def test_in_every_case_slip_goes_and_the_error_stays(tmp_path, case):
     kept, ratio, late, _ = compare(tmp_path, case, [1, 2, 3])
