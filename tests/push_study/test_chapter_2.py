@@ -179,7 +179,7 @@ def test_the_constraint_decides_whether_three_pushes_are_enough(tmp_path, capsys
     assert held["pushes"] == 3 and held["replans"] == held["contact_losses"] == 0, held
     assert held["position_error_m"] < 0.04 and held["orientation_error_rad"] < np.deg2rad(1.8)
     assert held["slid_m"] < 0.005, held
-    assert lost["slid_m"] > 0.015 > 3.0 * held["slid_m"], lost
+    assert lost["slid_m"] > 0.015 and lost["pushes"] > 3 and lost["replans"] > 0, lost
     three_push.conclude(StudyOptions(("three-push",), 1, 1, tmp_path), tasks, [held, lost])
     assert (tmp_path / "three-push.png").stat().st_size > 5000
     assert "1/1" in capsys.readouterr().out
