@@ -200,7 +200,7 @@ def statistics(rows: list[Row]) -> dict[str, Any]:
         by_cell(
             rows,
             ("scenario", "robots"),
-            ("position_error_m", "orientation_error_rad", "duration_s"),
+            ("position_error_m", "orientation_error_rad", "charged_s"),
         )
     )
 

@@ -24,7 +24,7 @@ def tasks(options: StudyOptions) -> list[SwarmTask]:
 
 def statistics(rows: list[Row]) -> dict[str, Any]:
     """Mean Lambda and time by object and number of robots."""
-    return dict(by_cell(rows, ("scenario", "robots"), ("lambda", "duration_s")))
+    return dict(by_cell(rows, ("scenario", "robots"), ("lambda", "charged_s")))
 
 
 def trial(task: SwarmTask) -> Row:

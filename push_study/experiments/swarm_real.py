@@ -54,13 +54,13 @@ def trial(task: SwarmTask) -> Row:
     """Through all six targets."""
     row = run(task)
     if row["success"]:
-        row["delta_s"] = row["duration_s"] * SIZE / length(EXPERIMENT)
+        row["delta_s"] = row["charged_s"] * SIZE / length(EXPERIMENT)
     return row
 
 
 def statistics(rows: list[Row]) -> dict[str, Any]:
     """Mean Lambda, time and delta by law."""
-    return dict(by_cell(rows, ("law",), ("lambda", "duration_s", "delta_s")))
+    return dict(by_cell(rows, ("law",), ("lambda", "charged_s", "delta_s")))
 
 
 def conclude(options: StudyOptions, tasks: Sequence[SwarmTask], rows: list[Row]) -> None:
@@ -77,7 +77,7 @@ def conclude(options: StudyOptions, tasks: Sequence[SwarmTask], rows: list[Row])
         mine = [r for r in rows if r.get("law") == law]
         good = [r for r in mine if r["success"]]
         if good:
-            table = np.array([[r[k] for k in ("duration_s", "delta_s", "lambda")] for r in good])
+            table = np.array([[r[k] for k in ("charged_s", "delta_s", "lambda")] for r in good])
             mean, least, most = table.mean(axis=0), table.min(axis=0), table.max(axis=0)
             print(
                 f"{law:22s}{len(good):2d} of {len(mine):<2d}    {mean[0]:5.0f} +- "

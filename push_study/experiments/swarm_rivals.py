@@ -64,7 +64,7 @@ def trial(task: RivalTask) -> Row:
 
 def statistics(rows: list[Row]) -> dict[str, Any]:
     """Mean Lambda and time by method and object."""
-    return dict(by_cell(rows, ("method", "scenario"), ("lambda", "duration_s")))
+    return dict(by_cell(rows, ("method", "scenario"), ("lambda", "charged_s")))
 
 
 def conclude(options: StudyOptions, tasks: Sequence[RivalTask], rows: list[Row]) -> None:
@@ -106,7 +106,7 @@ def _cell(rows: list[Row]) -> str:
     good = [r for r in rows if r["success"]]
     if not good:
         return f"0 of {len(rows)}" if rows else "-"
-    times = [r["duration_s"] for r in good]
+    times = [r["charged_s"] for r in good]
     told = (
         f"{np.mean(times):.0f} +- {np.std(times):.0f}, {np.mean([r['lambda'] for r in good]):.1f}"
     )

@@ -72,18 +72,16 @@ def trial(task: ScaleTask) -> Row:
         "seed": task.seed,
         "robots": task.robots,
         "success": outcome.success,
-        "reason": "" if outcome.success else outcome.reason,
-        "planning_cpu_s": outcome.planning,
+        **outcome.row(),
     }
     if outcome.success:
-        taken = outcome.charged
-        row |= {"duration_s": taken, "lambda": taken * disc.max_speed / DISTANCE}
+        row["lambda"] = outcome.charged * disc.max_speed / DISTANCE
     return row
 
 
 def statistics(rows: list[Row]) -> dict[str, Any]:
     """Mean Lambda and time by number of robots."""
-    return dict(by_cell(rows, ("robots",), ("lambda", "duration_s")))
+    return dict(by_cell(rows, ("robots",), ("lambda", "charged_s")))
 
 
 def conclude(options: StudyOptions, tasks: Sequence[ScaleTask], rows: list[Row]) -> None:
@@ -94,7 +92,7 @@ def conclude(options: StudyOptions, tasks: Sequence[ScaleTask], rows: list[Row])
         mine = [r for r in rows if r.get("robots") == count]
         good = [r for r in mine if r["success"]]
         if good:
-            times, units = ([r[k] for r in good] for k in ("duration_s", "lambda"))
+            times, units = ([r[k] for r in good] for k in ("charged_s", "lambda"))
             told = f"{np.mean(times):6.1f} +- {np.std(times):4.1f}  {np.mean(units):6.2f}"
             means.append((count, float(np.mean(units))))
         else:

@@ -65,7 +65,7 @@ def conclude(options: StudyOptions, tasks: Sequence[MapTask], rows: list[Row]) -
         for name in options.scenarios:
             cells = [_cell(mine, name, item) for item in OBJECTS]
             print(f"{name.removeprefix('transport_'):12s}" + "".join(f"{c:>20s}" for c in cells))
-    print("reached of all, mean time [s] (worst)")
+    print("reached of all, mean time with planning [s] (worst)")
     for row in rows:
         if not row["success"]:
             print(f"{row['scenario']}, {row.get('object')}, seed {row['seed']}: {row['reason']}")
@@ -75,7 +75,7 @@ def conclude(options: StudyOptions, tasks: Sequence[MapTask], rows: list[Row]) -
 
 def _cell(rows: list[Row], name: str, item: str) -> str:
     mine = [r for r in rows if r["scenario"] == name and r.get("object") == f"transport_{item}"]
-    times = [r["duration_s"] for r in mine if r["success"]]
+    times = [r["charged_s"] for r in mine if r["success"]]
     told = f" {np.mean(times):4.0f} ({max(times):.0f})" if times else ""
     return f"{len(times)} of {len(mine)}{told}" if mine else "-"
 

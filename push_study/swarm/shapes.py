@@ -49,7 +49,7 @@ def tasks_by(law: str, options: StudyOptions) -> list[SwarmTask]:
 def conclude(options: StudyOptions, tasks: Sequence[SwarmTask], rows: list[Row]) -> None:
     """Times by shape and size; a box plot; ways of the first trials; Figures 4.3 to 4.6."""
     print(f"\nsix targets, {length(SIMULATION):.2f} m straight from one to the next")
-    print("object            robots   all six   time [s]              Lambda")
+    print("object            robots   all six   charged time [s]      Lambda")
     for name in options.scenarios:
         for count in ROBOTS:
             mine = _those(rows, name, count)
@@ -57,7 +57,7 @@ def conclude(options: StudyOptions, tasks: Sequence[SwarmTask], rows: list[Row])
             if mine:
                 print(
                     f"{name:17s}{count:5d}   {len(good):2d} of {len(mine):<2d}"
-                    f"  {_spread([r['duration_s'] for r in good], 0)}"
+                    f"  {_spread([r['charged_s'] for r in good], 0)}"
                     f"  {_spread([r['lambda'] for r in good], 2)}"
                 )
     _boxes(options, rows)
@@ -86,11 +86,11 @@ def _boxes(options: StudyOptions, rows: list[Row]) -> None:
     figure, ax = plt.subplots(figsize=(9, 3))
     for k, name in enumerate(options.scenarios):
         found = [
-            [r["duration_s"] for r in _those(rows, name, count) if r["success"]] for count in ROBOTS
+            [r["charged_s"] for r in _those(rows, name, count) if r["success"]] for count in ROBOTS
         ]
         places = [5 * k + i for i in range(len(ROBOTS))]
         ax.boxplot([f or [np.nan] for f in found], positions=places, widths=0.7)
-    ax.set_ylabel("time [s]")
+    ax.set_ylabel("time with planning [s]")
     ax.set_ylim(bottom=0.0)
     ticks = [5 * k + i for k in range(len(options.scenarios)) for i in range(len(ROBOTS))]
     ax.set_xticks(ticks, [str(c) for c in ROBOTS] * len(options.scenarios), fontsize=7)
