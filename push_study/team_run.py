@@ -195,6 +195,7 @@ def run_team(
     limit: float,
     meanwhile: Callable[[LockstepRun, float, Array], None] | None = None,
     world: str = "",
+    mistake: Callable[[Scenario], Scenario] | None = None,
 ) -> Outcome:
     """Give a team a task and wait for its end, in a ROS domain of its own.
 
@@ -204,10 +205,13 @@ def run_team(
         world is drawn from it. limit: [s] of simulation.
     meanwhile: called at every tick with the run, the time [s] and poses of object and robots.
     world: kind of world, that of the scenario where it is empty.
+    mistake: makes of the scenario what the method believes instead; the world stays as drawn.
     """
     if world:
         believed = believed.settings("bridge", world=world)
     believed, actual, drawn = doubt.draw(believed, seed)
+    if mistake is not None:
+        believed = mistake(believed)
     with own_domain():
         return _run(system, believed, actual, task, limit, meanwhile, drawn)
 

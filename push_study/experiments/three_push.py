@@ -3,9 +3,10 @@
 The room is so low that the object cannot be turned by pi in fewer pushes. Between two of them the
 robot steps back, drives round the object and approaches another side, as in the thesis. A plan of
 ours asks for no more than is stable, and its pushes begin within a millimetre of it: the constraint
-would have nothing to decide. So the longest push begins with an offset, like the lines of the first
-case study: robot and object are put aside together, still in contact. Who steers back too sharply
-loses the object. With (2.53) and without it the controller steers the robot and hopes for the
+would have nothing to decide. So the last push begins with an offset, like the lines of the first
+case study: robot and object are put aside together, still in contact. What slides in an earlier
+push is made good when the robot approaches the next side; what slides in the last one is an error
+at the goal. With (2.53) and without it the controller steers the robot and hopes for the
 object, as the thesis does; with (2.57) it steers the object.
 """
 
@@ -53,7 +54,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
 """Settings of the controller."""
 OFFSET = 0.06
 """[m] by which robot and object are put aside; within what a controller calls off course."""
-_AFTER = 0.5  # [s] of the longest push until then
+_AFTER = 0.5  # [s] of the last push until then
 _MOVES, _LASTS = 2e-3, 10  # [m] in 0.1 s, for so many of them: the object is pushed
 _PATIENCE = 300.0  # [s] of simulation time
 THESIS = (0.04, np.deg2rad(1.8))
@@ -95,7 +96,7 @@ def tasks(options: StudyOptions) -> list[ThreePushTask]:
 
 
 class Offset:
-    """Puts robot and object aside, together, when the longest push of a plan has begun; once.
+    """Puts robot and object aside, together, when the last push of a plan has begun; once.
 
     by ``(2,)``: [m] of what was done, in the world's frame; None as long as nothing was.
     """
@@ -109,14 +110,12 @@ class Offset:
         """Wait for the moment, and do it."""
         machine, team = run.supervisor.machine, next(iter(run.teams.values()))
 
-        def longest() -> bool:
-            if machine.state is not State.PUSHING or not machine.segments:
-                return False
-            durations = [s.trajectory.duration for s in machine.segments]
-            return bool(machine.index == int(np.argmax(durations)))
+        def last() -> bool:
+            pushing = machine.state is State.PUSHING and bool(machine.segments)
+            return pushing and machine.index == len(machine.segments) - 1
 
-        run.spin_until(lambda: longest() or team.ended, _PATIENCE)
-        if not longest():
+        run.spin_until(lambda: last() or team.ended, _PATIENCE)
+        if not last():
             return
         begin = run.bridge.time
         run.spin_until(lambda: run.bridge.time >= begin + _AFTER, _PATIENCE)

@@ -1,7 +1,7 @@
 """A swarm through targets in an open room, in the graph."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from push_job.method import Task
 from push_model import se2
 from push_model.specs import EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
+from push_scenario.scenario import Scenario
 from push_study.pool import Row
 from push_study.rooms import around
 from push_study.team_run import Outcome, made_scenario, run_team
@@ -58,8 +59,8 @@ def positions(targets: Sequence[tuple[float, float]]) -> Task:
     return Task(tuple(np.array([x, y, math.nan]) for x, y in targets))
 
 
-def run(task: SwarmTask) -> Row:
-    """Through all targets, or as far as the swarm comes."""
+def run(task: SwarmTask, mistake: Callable[[Scenario], Scenario] | None = None) -> Row:
+    """Through all targets, or as far as the swarm comes. mistake: see ``run_team``."""
     item, robot = load_object(task.scenario), load_robot(ROBOT)
     width, height = 2.0 * (np.abs(np.array(task.targets)).max(axis=0) + _MARGIN)
     room = EnvironmentSpec((float(width), float(height)), resolution=0.05)
@@ -81,6 +82,7 @@ def run(task: SwarmTask) -> Row:
         task.seed,
         task.limit,
         world=task.world,
+        mistake=mistake,
     )
     keep_ways(task.trace, outcome)
     row: Row = {
