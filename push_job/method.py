@@ -12,7 +12,7 @@ hosts one (``push_ros/method_node.py``), a study runs it in the graph, and a not
 
 import importlib
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import entry_points
 from typing import Any, Protocol
@@ -96,6 +96,17 @@ class Refusal:
 
     code: JobError
     reason: str
+
+
+class SlicedMethod(Protocol):
+    """A method that takes long to assess a task, and can be interrupted meanwhile; optional."""
+
+    def assess_in_slices(
+        self, task: Task, belief: Belief, seen: Seen | None
+    ) -> Generator[int, None, Certificate | Refusal]:
+        """``assess`` in slices of some milliseconds. Yields what each has cost, in microseconds of
+        an idle machine, roughly; returns what ``assess`` does."""
+        ...
 
 
 class Method(Protocol):

@@ -5,7 +5,7 @@ door, with a code and a sentence, and touches no job. One that is already being 
 nothing. Any other one replaces the job under way.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -26,6 +26,10 @@ from push_ros.qos import COMMAND, LATCHED
 from push_ros.validation import FRAME, InvalidMessage, stamped_pose
 
 _SAME = 1e-6  # [m], [rad] within which a goal is the one that is pursued
+
+
+Answer = Callable[[GoalRefused | None], None]
+Consider = Callable[[Array, Answer], None]
 
 
 class JobOwner(Protocol):
@@ -73,7 +77,11 @@ class JobIntake:
         system: str,
         robots: Sequence[str],
         item: str,
+        consider: Consider | None = None,
     ) -> None:
+        """consider: in the place of the owner's ``check_goal``, where that takes time: answers, now
+        or later, with why a goal ``(3,)`` is refused, with None where it can be worked on."""
+        self._consider = consider or self._check
         self._node, self._owner, self._diagnostics = node, owner, diagnostics
         self._item = item
         self._goal: Array | None = None  # of the job under way, or of the last one
@@ -86,7 +94,7 @@ class JobIntake:
             MoveObject,
             names.team("move_object"),
             check=lambda request: None,
-            refuse=self._refuse_request,
+            consider=self._consider_request,
             preempt=lambda request: self._make_way(request.goal),
             start=lambda request: self._take(request.goal, bool(request.plan_only)),
             cancel=lambda: self._owner.end_job(JobError.CANCELED, "canceled"),
@@ -132,17 +140,25 @@ class JobIntake:
         self._state_publisher.publish(message)
         self._text_publisher.publish(String(data=f"{message.state_name}: {message.reason}"))
 
-    def _parse(self, message: PoseStamped, topic: str) -> Array:
-        """The goal ``(3,)``; raises GoalRefused."""
+    def _judge(self, message: PoseStamped, topic: str, answer: Answer) -> None:
+        """Answer, now or later, with why a goal is refused, with None where it can be taken."""
         try:
             goal = stamped_pose(message, "the goal")
         except InvalidMessage as error:
             self._diagnostics.refuse(topic, str(error))
             frame = message.header.frame_id != FRAME
             code = JobError.UNKNOWN_FRAME if frame else JobError.INVALID_GOAL
-            raise GoalRefused(code, str(error)) from None
-        self._owner.check_goal(goal)
-        return goal
+            answer(GoalRefused(code, str(error)))
+        else:
+            self._consider(goal, answer)
+
+    def _check(self, goal: Array, answer: Answer) -> None:
+        refusal = None
+        try:
+            self._owner.check_goal(goal)
+        except GoalRefused as error:
+            refusal = error
+        answer(refusal)
 
     def _pursued(self, goal: Array) -> bool:
         """Whether the job under way has this goal."""
@@ -152,24 +168,30 @@ class JobIntake:
         return bool(np.hypot(gap[0], gap[1]) < _SAME and abs(se2.wrap(float(gap[2]))) < _SAME)
 
     def _on_goal_pose(self, message: PoseStamped) -> None:
-        try:
-            self._parse(message, self._goal_topic)
-        except GoalRefused as refusal:
-            self._say_no(message, refusal)
-            return
-        self._make_way(message)
-        self._take(message, False)
+        def judged(refusal: GoalRefused | None) -> None:
+            if refusal is not None:
+                self._say_no(message, refusal)
+                return
+            self._make_way(message)
+            self._take(message, False)
 
-    def _refuse_request(self, request: Any) -> Any:
-        """The result for a goal that cannot be; None where it can."""
-        try:
-            if request.object not in ("", self._item):
-                raise GoalRefused(JobError.UNKNOWN_OBJECT, f"unknown object '{request.object}'")
-            self._parse(request.goal, "move_object")
-        except GoalRefused as refusal:
+        self._judge(message, self._goal_topic, judged)
+
+    def _consider_request(self, request: Any, answer: Callable[[Any], None]) -> None:
+        """Answer with the result for a goal that cannot be, with None where it can."""
+
+        def judged(refusal: GoalRefused | None) -> None:
+            if refusal is None:
+                answer(None)
+                return
             self._say_no(request.goal, refusal)
-            return MoveObject.Result(error_code=int(refusal.code), error_msg=str(refusal))
-        return None
+            answer(MoveObject.Result(error_code=int(refusal.code), error_msg=str(refusal)))
+
+        if request.object not in ("", self._item):
+            text = f"unknown object '{request.object}'"
+            judged(GoalRefused(JobError.UNKNOWN_OBJECT, text))
+            return
+        self._judge(request.goal, "move_object", judged)
 
     def _make_way(self, message: PoseStamped) -> None:
         """End what is under way, unless it is the same."""
@@ -208,7 +230,9 @@ class JobIntake:
         return response
 
     def _on_cancel(self, request: Any, response: Any) -> Any:
-        response.success = self._owner.busy or self._owner.plan_ready
-        response.message = "canceled" if response.success else "there is nothing to cancel"
+        refusals = self._state.refusals  # a goal that is still judged is refused
+        some = self._owner.busy or self._owner.plan_ready
         self._owner.end_job(JobError.CANCELED, "canceled")
+        response.success = some or self._state.refusals > refusals
+        response.message = "canceled" if response.success else "there is nothing to cancel"
         return response

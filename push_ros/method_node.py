@@ -7,7 +7,7 @@ Every frame is answered with one message for all robots of the team.
 import math
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +16,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from std_msgs.msg import Header
 
-from push_estimation.pose_gate import PoseGateSettings, Stamp
+from push_estimation.pose_gate import Stamp
 from push_job.method import (
     Arena,
     Method,
@@ -39,10 +39,11 @@ from push_msgs.msg import Report as ReportMessage
 from push_ros.belief_feed import BeliefFeed
 from push_ros.commander import Commander, TeamCommander
 from push_ros.diagnostics import Diagnostics
+from push_ros.door import Door
 from push_ros.job_intake import JobIntake
 from push_ros.map_feed import MapFeed
+from push_ros.method_settings import declare_method
 from push_ros.names import names_of
-from push_ros.parameters import declare_settings
 from push_ros.pose_feed import Frame, PoseFeed
 from push_ros.process import run_node
 from push_ros.qos import STATUS
@@ -51,6 +52,7 @@ from push_ros.task_server import TaskAction, TaskServer
 from push_scenario.scenario import Scenario, load_scenario
 
 PATIENCE = 10.0  # [s] without poses of the object after which a task ends
+_SILENCE = 0.3  # [s] without a frame after which goals are judged without
 _REPORTS = 0.05  # [s] of pose time between reports
 _WAITING = Status(int(JobPhase.IDLE), "IDLE", "waiting for a map")
 
@@ -94,7 +96,7 @@ class MethodNode(Node):
         name = str(self.declare_parameter("method", given_name).value)
         if chosen is None:
             chosen = _chosen(name)
-        self.spec, self._key, hosting = chosen, name, hosting or Hosting()
+        self.spec, hosting = chosen, hosting or Hosting()
         self.names = names = names_of(self, world)
         file = self.declare_parameter("scenario", chosen.example).value
         self.scenario = scenario = scenario or load_scenario(str(file))
@@ -107,7 +109,7 @@ class MethodNode(Node):
         self._others = {
             k: r for k, r in scenario.radii.items() if k not in (*self.robots, self.object)
         }
-        self.settings, gate = self._declare(chosen, scenario)
+        self.settings, gate = declare_method(self, chosen, name, scenario)
         self.method: Method | None = None
         self._why_not = "there is no map yet"
         self._grid: Grid | None = None
@@ -127,8 +129,10 @@ class MethodNode(Node):
         self._reports = self.create_publisher(ReportMessage, names.team("report"), STATUS)
         bodies = [*self.robots, self.object, *self._others]
         self._poses = PoseFeed(self, names, gate, bodies, self._diagnostics, self._on_frame)
+        self._door = Door(self._judge)
         self._intake = JobIntake(
-            self, names, self._diagnostics, self, chosen.name, list(self.robots), self.object
+            *(self, names, self._diagnostics, self, chosen.name, list(self.robots), self.object),
+            consider=lambda goal, answer: self.consider_task(self._task(goal), answer),
         )
         self._servers = [
             TaskServer(self, names.team(a.name), a, self, self._diagnostics.refuse)
@@ -140,25 +144,6 @@ class MethodNode(Node):
         )
         self._waiting = self._poses.clock.now  # since when the object is not seen
         self._look_after_task()
-
-    def _declare(
-        self, spec: MethodSpec, scenario: Scenario
-    ) -> tuple[dict[str, Any], PoseGateSettings]:
-        values = dict(scenario.parameters.get(self._key, {}))
-        sections = {k: values.pop(k, {}) for k in (*spec.sections, "poses") if k}
-        made = {
-            k: declare_settings(self, cls, sections[k], k, f"{spec.name}.{k}")
-            for k, cls in spec.sections.items()
-            if k
-        }
-        if "" in spec.sections:
-            made[""] = declare_settings(self, spec.sections[""], values, where=spec.name)
-        elif values:
-            raise SettingsError(f"{spec.name}: unknown key '{next(iter(values))}'")
-        gate = declare_settings(
-            self, PoseGateSettings, sections["poses"], "poses", f"{spec.name}.poses"
-        )
-        return made, gate
 
     @property
     def ready(self) -> bool:
@@ -208,22 +193,35 @@ class MethodNode(Node):
 
     def end_job(self, code: JobError, message: str) -> None:
         """See JobOwner."""
+        if code is JobError.CANCELED:
+            self._door.drop(code, message)
         if self.method is not None:
             self.method.end(code, message)
         self._look_after_task()
 
     # The host of tasks, see TaskHost
 
-    def check_task(self, task: Task) -> None:
+    def consider_task(self, task: Task, answer: Callable[[GoalRefused | None], None]) -> None:
         """See TaskHost."""
+        self._door.ask(task, answer)
+
+    def check_task(self, task: Task) -> None:
+        """Raise GoalRefused unless a task can be worked on; at once."""
+        for _ in self._judge(task):
+            pass
+
+    def _judge(self, task: Task) -> Generator[int, None, None]:
+        method = self.method
         if self._grid is None:
             return  # it is found out when the map comes
-        if self.method is None:
+        if method is None:
             raise GoalRefused(JobError.PLANNING_FAILED, self._why_not)
         for target in task.targets:
             if not self._grid.contains(float(target[0]), float(target[1])):
                 raise GoalRefused(JobError.OUTSIDE_MAP, "the goal is outside the map")
-        found = self.method.assess(task, self.beliefs.current, self._seen)
+        asked = task, self.beliefs.current, self._seen
+        slices = getattr(method, "assess_in_slices", None)
+        found = method.assess(*asked) if slices is None else (yield from slices(*asked))
         if isinstance(found, Refusal):
             raise GoalRefused(found.code, found.reason)
 
@@ -237,6 +235,7 @@ class MethodNode(Node):
     # The world
 
     def _take_map(self, grid: Grid) -> None:
+        self._door.drop(JobError.PREEMPTED, "the map has changed")
         self.end_job(JobError.PREEMPTED, "the map has changed")
         self._grid = grid
         arena = Arena(grid, self.robot_specs, self.object, self.item, self.settings, self.partners)
@@ -253,10 +252,12 @@ class MethodNode(Node):
             self._reported = -math.inf
             if self.method is not None:
                 self.method.revive()
+            self._door.drop(JobError.CLOCK_RESET, "the clock went back")
             self.end_job(JobError.CLOCK_RESET, "the clock went back")
         elif frame.verdict is not Stamp.REFUSED:
             commands = self._step(frame)
         self._commander.send(self._stamp, commands)
+        self._door.go_on()
         self._look_after_task()
 
     def _step(self, frame: Frame) -> Mapping[str, tuple[float, float]]:
@@ -292,6 +293,8 @@ class MethodNode(Node):
     def _on_watchdog(self) -> None:
         """For when no frame comes; in lockstep, where the world waits, nothing happens."""
         now = self._poses.clock.now
+        if self._poses.paused or self._poses.silence > _SILENCE:
+            self._door.go_on()
         if not self.busy:
             self._waiting = now
         elif now - self._waiting > PATIENCE and self._poses.silence > PATIENCE:

@@ -4,7 +4,7 @@ Robots may come, leave and die meanwhile: whoever is seen and does as it is told
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -134,6 +134,12 @@ class SwarmJob:
         """Of a target before it is begun: whether it can be reached, by how many robots, with which
         margin. Arguments as of ``step``; a job that is under way is not touched."""
         return self._feasibility.assess(target, pose, robots)
+
+    def assess_in_slices(
+        self, target: Array, pose: Array, robots: Mapping[str, Array]
+    ) -> Generator[int, None, Assessment]:
+        """``assess`` in slices, see ``Feasibility.slices``."""
+        return self._feasibility.slices(target, pose, robots)
 
     def begin(self, targets: Sequence[Array]) -> None:
         """Take targets, at least one; no job is under way."""
