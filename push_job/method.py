@@ -70,11 +70,13 @@ class Told:
 
     commands: by robot; v [m/s] and omega [rad/s] of robots on wheels, vx and vy [m/s] in the fixed
     frame of the others. A robot without one stands. planning: [s] CPU time that planning took in
-    this step; studies charge it.
+    this step; studies charge it. turns: [rad/s] by robot, of those that move in any direction; one
+    without does not turn.
     """
 
     commands: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     planning: float = 0.0
+    turns: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

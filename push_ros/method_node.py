@@ -7,7 +7,7 @@ Every frame is answered with one message for all robots of the team.
 import math
 import sys
 import time
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,6 +24,7 @@ from push_job.method import (
     Refusal,
     Seen,
     Task,
+    Told,
     Unsuited,
     method_names,
     method_spec,
@@ -247,7 +248,7 @@ class MethodNode(Node):
 
     def _on_frame(self, frame: Frame) -> None:
         self._stamp = frame.stamp
-        commands: Mapping[str, tuple[float, float]] = {}
+        told = Told()
         if frame.verdict is Stamp.RESET:
             self._reported = -math.inf
             if self.method is not None:
@@ -255,31 +256,31 @@ class MethodNode(Node):
             self._door.drop(JobError.CLOCK_RESET, "the clock went back")
             self.end_job(JobError.CLOCK_RESET, "the clock went back")
         elif frame.verdict is not Stamp.REFUSED:
-            commands = self._step(frame)
-        self._commander.send(self._stamp, commands)
+            told = self._step(frame)
+        self._commander.send(self._stamp, told)
         self._door.go_on()
         self._look_after_task()
 
-    def _step(self, frame: Frame) -> Mapping[str, tuple[float, float]]:
-        """Commands by name; robots without one stand."""
+    def _step(self, frame: Frame) -> Told:
+        """What the method says; nothing where nobody has to move."""
         method, item = self.method, self._poses.pose(self.object)
         if item is None:
             self._missing += frame.elapsed
             if self._missing > PATIENCE:
                 self.end_job(JobError.POSES_STALE, f"no poses of '{self.object}'")
-            return {}
+            return Told()
         self._missing, self._waiting = 0.0, self._poses.clock.now
         robots = {n: p for n in self.robots if (p := self._poses.pose(n)) is not None}
         self._seen = seen = Seen(self._poses.stamp, item, robots, self._poses.discs(self._others))
         if method is None or not self.busy:
-            return {}
+            return Told()
         began = time.thread_time()
         told = method.step(seen, self.beliefs.current)
         cost = time.thread_time() - began
         self.planning_time += told.planning
         if seen.time - self._reported >= _REPORTS - 1e-9:
             self._report(method, seen, cost)
-        return told.commands
+        return told
 
     def _report(self, method: Method, seen: Seen, cost: float) -> None:
         report = method.report(seen)

@@ -154,6 +154,7 @@ class SwarmAgentNode(Node):
             own = self._poses.pose(self.robot)
             turned = se2.rotation_matrix(-float(own[2])) @ twist if own is not None else twist
             message.twist.linear.x, message.twist.linear.y = (float(v) for v in turned)
+            message.twist.angular.z = float(self.agent.job.turns.get(self.robot, 0.0))
         else:
             message.twist.linear.x, message.twist.angular.z = twist
         self._commands.publish(message)

@@ -6,12 +6,11 @@ commands; it then only takes goals, watches, and tells how the task stands.
 
 import math
 import sys
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from push_job.method import Task
+from push_job.method import Task, Told
 from push_job.report import Status
 from push_model.jobs import GoalRefused, JobError
 from push_msgs.action import SwarmMove
@@ -38,7 +37,7 @@ class TargetCommander:
             SwarmTarget, node.names.team("swarm_target"), COMMAND
         )
 
-    def send(self, stamp: Any, commands: Mapping[str, tuple[float, float]]) -> None:
+    def send(self, stamp: Any, told: Told) -> None:
         """See Commander."""
         job = getattr(self._node.method, "job", None)
         target = job.target if job is not None and job.busy else None

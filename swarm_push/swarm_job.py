@@ -111,6 +111,12 @@ class SwarmJob:
         return frozenset(self._liveness.dead)
 
     @property
+    def turns(self) -> Mapping[str, float]:
+        """Turn rates [rad/s], beside the commands of the last step, of robots that move in any
+        direction and are tested whether they move at all."""
+        return self._liveness.turns if self.busy and self.holonomic else {}
+
+    @property
     def targets(self) -> tuple[Array, ...]:
         """Of the job, poses ``(3,)`` of the centre of mass, headings nan where any will do."""
         return self._queue.poses

@@ -127,7 +127,8 @@ class SwarmMethod:
         """See Method."""
         self._take_up(belief)
         pose = self._item.mass_pose(seen.object)
-        return Told(self.job.step(seen.time, pose, seen.robots, seen.obstacles))
+        commands = self.job.step(seen.time, pose, seen.robots, seen.obstacles)
+        return Told(commands, turns=self.job.turns)
 
     def report(self, seen: Seen) -> Report | None:
         """See Method: density, cells and centroids, and how far it is to the target."""
