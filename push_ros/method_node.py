@@ -26,15 +26,12 @@ from push_job.method import (
     Task,
     Told,
     Unsuited,
-    method_names,
-    method_spec,
 )
 from push_job.report import Status
 from push_model.arrays import Array
 from push_model.drives import HolonomicDrive
 from push_model.jobs import GoalRefused, JobError, JobPhase
 from push_model.occupancy import OccupancyGrid as Grid
-from push_model.settings import SettingsError
 from push_msgs.action import MoveObject
 from push_msgs.msg import Report as ReportMessage
 from push_ros.belief_feed import BeliefFeed
@@ -42,8 +39,9 @@ from push_ros.commander import Commander, TeamCommander
 from push_ros.diagnostics import Diagnostics
 from push_ros.door import Door
 from push_ros.job_intake import JobIntake
+from push_ros.job_memory import JobMemory, KeptJob
 from push_ros.map_feed import MapFeed
-from push_ros.method_settings import declare_method
+from push_ros.method_settings import chosen_method, declare_method
 from push_ros.names import names_of
 from push_ros.pose_feed import Frame, PoseFeed
 from push_ros.process import run_node
@@ -87,16 +85,18 @@ class MethodNode(Node):
         namespace: str = "",
         world: str = "",
         hosting: Hosting | None = None,
+        memory: JobMemory | None = None,
     ) -> None:
         """spec: the method, or its name; the parameter ``method`` where it is empty. robots, item:
-        the team's. namespace: the team's; world: the bridge's, where it is another one."""
-        chosen = spec if isinstance(spec, MethodSpec) else _chosen(spec) if spec else None
+        the team's. namespace: the team's; world: the bridge's, where it is another one.
+        memory: of jobs, see ``JobIntake``."""
+        chosen = spec if isinstance(spec, MethodSpec) else chosen_method(spec) if spec else None
         kind = chosen.name if chosen is not None else "method"
         super().__init__(kind.replace("-", "_"), namespace=namespace)
         given_name = kind if isinstance(spec, MethodSpec) else spec
         name = str(self.declare_parameter("method", given_name).value)
         if chosen is None:
-            chosen = _chosen(name)
+            chosen = chosen_method(name)
         self.spec, hosting = chosen, hosting or Hosting()
         self.names = names = names_of(self, world)
         file = self.declare_parameter("scenario", chosen.example).value
@@ -134,6 +134,7 @@ class MethodNode(Node):
         self._intake = JobIntake(
             *(self, names, self._diagnostics, self, chosen.name, list(self.robots), self.object),
             consider=lambda goal, answer: self.consider_task(self._task(goal), answer),
+            memory=memory,
         )
         self._servers = [
             TaskServer(self, names.team(a.name), a, self, self._diagnostics.refuse)
@@ -175,6 +176,14 @@ class MethodNode(Node):
 
     def execute(self) -> None:
         """See JobOwner; there is never a plan that waits."""
+
+    def resume(self, job: KeptJob) -> None:
+        """See JobOwner."""
+        self.take_task(Task(tuple(np.array(t) for t in job.targets)))
+
+    def stop(self) -> None:
+        """The process ends in good order."""
+        self._intake.forget()
 
     def check_goal(self, goal: Array) -> None:
         """See JobOwner."""
@@ -229,6 +238,7 @@ class MethodNode(Node):
     def take_task(self, task: Task) -> None:
         """See TaskHost."""
         self._waiting, self._missing = self._poses.clock.now, 0.0
+        self._intake.keep(task)
         if self.method is not None:
             self.method.begin(task, self.beliefs.current)
         self._look_after_task()
@@ -254,12 +264,21 @@ class MethodNode(Node):
             if self.method is not None:
                 self.method.revive()
             self._door.drop(JobError.CLOCK_RESET, "the clock went back")
+            self._intake.reset()
             self.end_job(JobError.CLOCK_RESET, "the clock went back")
         elif frame.verdict is not Stamp.REFUSED:
             told = self._step(frame)
         self._commander.send(self._stamp, told)
         self._door.go_on()
+        if frame.verdict is not Stamp.REFUSED:
+            ready = self.ready and self.method is not None and self._seen is not None
+            self._intake.frame(self._poses.stamp, self._bodies(), ready, self.status.index)
         self._look_after_task()
+
+    def _bodies(self) -> dict[str, Array]:
+        """Poses of the object and the robots that are seen."""
+        named = ((n, self._poses.pose(n)) for n in (self.object, *self.robots))
+        return {n: pose for n, pose in named if pose is not None}
 
     def _step(self, frame: Frame) -> Told:
         """What the method says; nothing where nobody has to move."""
@@ -294,6 +313,7 @@ class MethodNode(Node):
     def _on_watchdog(self) -> None:
         """For when no frame comes; in lockstep, where the world waits, nothing happens."""
         now = self._poses.clock.now
+        self._intake.wait(now)
         if self._poses.paused or self._poses.silence > _SILENCE:
             self._door.go_on()
         if not self.busy:
@@ -368,14 +388,6 @@ class MethodNode(Node):
             "poses refused": self._poses.gate.refused,
             "warning": "no poses" if self._poses.pose(self.object) is None else "",
         }
-
-
-def _chosen(name: str) -> MethodSpec:
-    spec = method_spec(name)
-    if spec is None:
-        known = ", ".join(method_names())
-        raise SettingsError(f"no method called '{name}'; expected one of: {known}, or MODULE:NAME")
-    return spec
 
 
 def main() -> int:

@@ -5,7 +5,7 @@ from typing import Any
 from rclpy.node import Node
 
 from push_estimation.pose_gate import PoseGateSettings
-from push_job.method import MethodSpec
+from push_job.method import MethodSpec, method_names, method_spec
 from push_model.settings import SettingsError
 from push_ros.parameters import declare_settings
 from push_scenario.scenario import Scenario
@@ -33,3 +33,12 @@ def declare_method(
         node, PoseGateSettings, sections["poses"], "poses", f"{spec.name}.poses"
     )
     return made, gate
+
+
+def chosen_method(name: str) -> MethodSpec:
+    """The method of a name; raises SettingsError where there is none."""
+    spec = method_spec(name)
+    if spec is None:
+        known = ", ".join(method_names())
+        raise SettingsError(f"no method called '{name}'; expected one of: {known}, or MODULE:NAME")
+    return spec
