@@ -196,7 +196,9 @@ class MethodSpec:
 
     make: a method for an arena; raises Unsuited. sections: classes of its settings by section, ""
     for its own level. check: raises SettingsError for a team that the method cannot drive, given
-    its robots' types by name and the object. example: a scenario to start it with.
+    its robots' types by name and the object. example: a scenario to start it with. open_team:
+    whether robots may join and leave in the middle of a task, so that a node may take in robots
+    that the scenario does not name.
     """
 
     name: str
@@ -204,6 +206,7 @@ class MethodSpec:
     sections: Mapping[str, type[Any]] = field(default_factory=dict)
     check: Callable[[Mapping[str, RobotSpec], ObjectSpec], None] = any_team
     example: str = "swarm-square"
+    open_team: bool = False
 
     def settings(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Settings objects by section, from nested values as a scenario has them.

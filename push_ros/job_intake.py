@@ -183,10 +183,11 @@ class JobIntake:
         stamp: [s] of a frame. bodies: poses ``(3,)`` of the object and the robots that are seen.
         ready: whether a job could be worked on. reached: targets of the task that are.
         """
-        if self._keeper.pending is None:
-            if not self._owner.busy and not self._owner.plan_ready:
-                self._keeper.end()
-            self._keeper.see(stamp, self._run, bodies, reached)
+        pending = self._keeper.pending is not None
+        if not pending and not self._owner.busy and not self._owner.plan_ready:
+            self._keeper.end()
+        self._keeper.see(stamp, self._run, bodies, reached)
+        if not pending:
             return
         try:
             job = self._keeper.judge(stamp, self._run, bodies) if ready else None

@@ -34,6 +34,7 @@ class JobKeeper:
         """team: object, then robots."""
         self._memory, self._team = memory, team
         self._current: KeptJob | None = None
+        self._seen: tuple[float, str, Mapping[str, Array]] = (-math.inf, "", {})
         self.pending: KeptJob | None = None
         kept = memory.read()
         if kept is not None and kept.team == team:
@@ -54,9 +55,9 @@ class JobKeeper:
         self.pending = None
         poses = tuple(tuple(float(v) for v in t) for t in targets)
         self._current = KeptJob(
-            self._team, job, goal.hex(), poses, times, plan_only, -math.inf, restarts=restarts
+            self._team, job, goal.hex(), poses, times, plan_only, restarts=restarts
         )
-        self._memory.write(None)  # kept with the next frame
+        self._keep(self._current, 0)
 
     def end(self) -> None:
         """There is no job any more."""
@@ -66,15 +67,16 @@ class JobKeeper:
 
     def see(self, stamp: float, world: str, bodies: Mapping[str, Array], reached: int) -> None:
         """Keep the job under way as it stands in a frame of a stamp [s]. reached: targets."""
+        self._seen = stamp, world, bodies
         job = self._current
-        if job is None or 0.0 <= stamp - job.stamp < _EVERY:
-            return
-        self._current = job = replace(
-            job,
-            stamp=stamp,
-            world=world,
-            bodies=tuple((n, *(float(v) for v in p)) for n, p in bodies.items()),
-        )
+        if job is not None and not 0.0 <= stamp - job.stamp < _EVERY:
+            self._keep(job, reached)
+
+    def _keep(self, job: KeptJob, reached: int) -> None:
+        """As the job stands in the newest frame."""
+        stamp, world, bodies = self._seen
+        rows = tuple((n, *(float(v) for v in p)) for n, p in bodies.items())
+        self._current = job = replace(job, stamp=stamp, world=world, bodies=rows)
         left = job.targets[min(reached, len(job.targets) - 1) :] if not job.times else job.targets
         self._memory.write(replace(job, targets=left))
 

@@ -7,8 +7,7 @@ Every frame is answered with one message for all robots of the team.
 import math
 import sys
 import time
-from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Generator
 from typing import Any
 
 import numpy as np
@@ -35,39 +34,26 @@ from push_model.occupancy import OccupancyGrid as Grid
 from push_msgs.action import MoveObject
 from push_msgs.msg import Report as ReportMessage
 from push_ros.belief_feed import BeliefFeed
-from push_ros.commander import Commander, TeamCommander
+from push_ros.commander import TeamCommander
 from push_ros.diagnostics import Diagnostics
 from push_ros.door import Door
+from push_ros.hosting import Hosting
 from push_ros.job_intake import JobIntake
 from push_ros.job_memory import JobMemory, KeptJob
 from push_ros.map_feed import MapFeed
-from push_ros.method_settings import chosen_method, declare_method
+from push_ros.method_settings import chosen_method, declare_method, declare_roster
 from push_ros.names import names_of
 from push_ros.pose_feed import Frame, PoseFeed
 from push_ros.process import run_node
 from push_ros.qos import STATUS
 from push_ros.report_conversions import report_to_ros
-from push_ros.task_server import TaskAction, TaskServer
+from push_ros.task_server import TaskServer
 from push_scenario.scenario import Scenario, load_scenario
 
 PATIENCE = 10.0  # [s] without poses of the object after which a task ends
 _SILENCE = 0.3  # [s] without a frame after which goals are judged without
 _REPORTS = 0.05  # [s] of pose time between reports
 _WAITING = Status(int(JobPhase.IDLE), "IDLE", "waiting for a map")
-
-
-@dataclass(frozen=True)
-class Hosting:
-    """What a package adds to the node of its method.
-
-    actions: further actions, made from the node. commander: in the place of the one that sends
-    velocities to all robots. attach: called with the node when it is made, e.g. for clients of
-    other nodes; its result becomes the ``partners`` of the arena.
-    """
-
-    actions: Callable[["MethodNode"], Sequence[TaskAction]] = lambda node: ()
-    commander: Callable[["MethodNode"], Commander | None] = lambda node: None
-    attach: Callable[["MethodNode"], Any] = lambda node: None
 
 
 class MethodNode(Node):
@@ -102,14 +88,11 @@ class MethodNode(Node):
         file = self.declare_parameter("scenario", chosen.example).value
         self.scenario = scenario = scenario or load_scenario(str(file))
         given = self.declare_parameter("robots", list(robots) or [""]).value
-        self.robots = tuple(r for r in given if r) or tuple(scenario.robots)
+        team = tuple(r for r in given if r) or tuple(scenario.robots)
         given_item = str(self.declare_parameter("object", item).value)
-        self.robot_specs = {n: scenario.robot(n)[1] for n in self.robots}
+        self.robot_specs = {n: scenario.robot(n)[1] for n in team}
         self.object, self.item = scenario.object(given_item)
         chosen.check(self.robot_specs, self.item)
-        self._others = {
-            k: r for k, r in scenario.radii.items() if k not in (*self.robots, self.object)
-        }
         self.settings, gate = declare_method(self, chosen, name, scenario)
         self.method: Method | None = None
         self._why_not = "there is no map yet"
@@ -123,16 +106,20 @@ class MethodNode(Node):
         self._diagnostics = Diagnostics(self, names, self._state)
         self.beliefs = BeliefFeed(self, names, scenario, self._diagnostics)
         self.partners = hosting.attach(self)
-        holonomic = isinstance(self.robot_specs[self.robots[0]].drive, HolonomicDrive)
-        self._commander = hosting.commander(self) or TeamCommander(
-            self, names, self.robots, holonomic
+        commander, kind_of = hosting.commander(self), self.robot_specs[team[0]]
+        self._roster = declare_roster(
+            self, scenario, name, team, self.object, chosen.open_team and commander is None
         )
+        holonomic = isinstance(kind_of.drive, HolonomicDrive)
+        self._commander = commander or TeamCommander(self, names, self._roster, holonomic)
         self._reports = self.create_publisher(ReportMessage, names.team("report"), STATUS)
-        bodies = [*self.robots, self.object, *self._others]
-        self._poses = PoseFeed(self, names, gate, bodies, self._diagnostics, self._on_frame)
+        bodies = [*team, self.object, *self._roster.obstacles]
+        self._poses = PoseFeed(
+            *(self, names, gate, bodies, self._diagnostics, self._on_frame), meet=self._meet
+        )
         self._door = Door(self._judge)
         self._intake = JobIntake(
-            *(self, names, self._diagnostics, self, chosen.name, list(self.robots), self.object),
+            *(self, names, self._diagnostics, self, chosen.name, list(team), self.object),
             consider=lambda goal, answer: self.consider_task(self._task(goal), answer),
             memory=memory,
         )
@@ -146,6 +133,15 @@ class MethodNode(Node):
         )
         self._waiting = self._poses.clock.now  # since when the object is not seen
         self._look_after_task()
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """Names of the team's robots, further ones too."""
+        return self._roster.robots
+
+    def _meet(self, names: Collection[str]) -> Collection[str]:
+        self._roster.meet(names, self.object)
+        return (*self._roster.robots, *self._roster.obstacles)
 
     @property
     def ready(self) -> bool:
@@ -290,7 +286,9 @@ class MethodNode(Node):
             return Told()
         self._missing, self._waiting = 0.0, self._poses.clock.now
         robots = {n: p for n in self.robots if (p := self._poses.pose(n)) is not None}
-        self._seen = seen = Seen(self._poses.stamp, item, robots, self._poses.discs(self._others))
+        self._seen = seen = Seen(
+            self._poses.stamp, item, robots, self._poses.discs(self._roster.obstacles)
+        )
         if method is None or not self.busy:
             return Told()
         began = time.thread_time()
@@ -337,6 +335,7 @@ class MethodNode(Node):
     def _publish_status(self, status: Status) -> None:
         self._intake.publish(
             self._poses.stamp,
+            robots=list(self.robots),
             state=int(status.phase),
             state_name=status.name,
             reason=status.reason,

@@ -96,6 +96,7 @@ class SwarmAgentNode(Node):
 
     def _declare(self, scenario: Scenario) -> tuple[dict[str, Any], PoseGateSettings]:
         values = dict(scenario.parameters.get("swarm", {}))
+        values.pop("roster", None)  # each robot has a node of its own
         classes = {**SECTIONS, "poses": PoseGateSettings}
         sections = {k: values.pop(k, {}) for k in classes if k}
         made: dict[str, Any] = {

@@ -15,7 +15,8 @@ from push_job.report import Status
 from push_model.jobs import GoalRefused, JobError
 from push_msgs.action import SwarmMove
 from push_msgs.msg import SwarmTarget
-from push_ros.method_node import Hosting, MethodNode
+from push_ros.hosting import Hosting
+from push_ros.method_node import MethodNode
 from push_ros.process import run_node
 from push_ros.qos import COMMAND
 from push_ros.task_server import TaskAction

@@ -168,7 +168,7 @@ class SwarmMethod:
     def release(self) -> frozenset[str]:
         """See Method: all robots when no task is under way, the dead at any time."""
         if self.job.state is JobPhase.IDLE:
-            return frozenset(self._arena.robots)
+            return frozenset((*self._arena.robots, *self.job.taking_part))
         return self.job.dead
 
     def errors(self, seen: Seen) -> tuple[float, float]:
@@ -203,4 +203,4 @@ def check_team(robots: Mapping[str, RobotSpec], item: ObjectSpec) -> None:
         raise SettingsError("has robots without a ring bumper and a controlled velocity")
 
 
-SWARM = MethodSpec("swarm", SwarmMethod, SECTIONS, check_team, "swarm-square")
+SWARM = MethodSpec("swarm", SwarmMethod, SECTIONS, check_team, "swarm-square", open_team=True)
