@@ -75,7 +75,7 @@ class JobKeeper:
     def _keep(self, job: KeptJob, reached: int) -> None:
         """As the job stands in the newest frame."""
         stamp, world, bodies = self._seen
-        rows = tuple((n, *(float(v) for v in p)) for n, p in bodies.items())
+        rows = tuple((n, float(p[0]), float(p[1]), float(p[2])) for n, p in bodies.items())
         self._current = job = replace(job, stamp=stamp, world=world, bodies=rows)
         left = job.targets[min(reached, len(job.targets) - 1) :] if not job.times else job.targets
         self._memory.write(replace(job, targets=left))

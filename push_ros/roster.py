@@ -54,7 +54,7 @@ class Roster:
         self._strangers: dict[str, None] = {}  # in the order in which they appeared
         self._released: tuple[str, ...] = ()
         self.robots: tuple[str, ...] = ()
-        self.obstacles = {}
+        self.obstacles: dict[str, float] = {}
         self.change(settings)
 
     def change(self, settings: RosterSettings) -> None:

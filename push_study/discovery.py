@@ -70,7 +70,8 @@ class Discovery:
     def probe(self) -> None:
         """Spin until a fresh subscription has heard a fresh publisher."""
         self._number += 1
-        topic, heard = f"_probe/p{self._number}", []
+        topic = f"_probe/p{self._number}"
+        heard: list[Empty] = []
         publisher = self._node.create_publisher(Empty, topic, LATCHED)
         subscription = self._node.create_subscription(Empty, topic, heard.append, LATCHED)
         try:
