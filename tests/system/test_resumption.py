@@ -97,6 +97,7 @@ def test_targets_in_a_row_go_on_with_those_that_are_left(monkeypatch):
         assert run.spin_until(lambda: job.index == 1, 200.0)
         run.spin_until(lambda: False, 1.0)
         die(run)
+        away(run, 0.5)
         respawn(run)
         assert run.spin_until(lambda: run.supervisor.busy, 10.0)
         (target,) = run.supervisor.method.job.targets
@@ -161,16 +162,21 @@ def test_a_cancel_ends_a_job_that_has_not_been_taken_up_yet(monkeypatch):
     with running(monkeypatch, "swarm") as run:
         pushing(run, goal)
         die(run)
-        monkeypatch.setattr("push_ros.method_node.MethodNode.ready", False)
-        respawn(run)
-        assert run.observer.state.state == JobState.PLANNING
-        client = run.observer.create_client(Trigger, "/cancel")
-        assert run.spinner.until(client.service_is_ready, 5.0)
-        answer = client.call_async(Trigger.Request())
-        assert run.spin_until(answer.done, 5.0)
-        assert answer.result().success
-        assert run.spin_until(lambda: run.observer.state.state == JobState.IDLE, 5.0)
-        assert run.observer.state.error_code == JobError.CANCELED
-        monkeypatch.undo()
+        away(run, 0.5)
+        with monkeypatch.context() as patch:
+            patch.setattr("push_ros.method_node.MethodNode.ready", False)
+            cancel_before_it_is_taken_up(run)
         run.spin_until(lambda: False, 1.0)
         assert not run.supervisor.busy
+
+
+def cancel_before_it_is_taken_up(run):
+    respawn(run)
+    assert run.observer.state.state == JobState.PLANNING
+    client = run.observer.create_client(Trigger, "/cancel")
+    assert run.spinner.until(client.service_is_ready, 5.0)
+    answer = client.call_async(Trigger.Request())
+    assert run.spin_until(answer.done, 5.0)
+    assert answer.result().success
+    assert run.spin_until(lambda: run.observer.state.state == JobState.IDLE, 5.0)
+    assert run.observer.state.error_code == JobError.CANCELED
