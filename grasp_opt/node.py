@@ -17,7 +17,8 @@ from push_model.jobs import JobError
 from push_msgs.action import PlanGroupPush, PushAlong
 from push_ros.actions import GoalClient
 from push_ros.conversions import circles_to_ros, pose_stamped_to_ros, pose_to_ros
-from push_ros.method_node import PATIENCE, Hosting, MethodNode
+from push_ros.hosting import Hosting
+from push_ros.method_node import PATIENCE, MethodNode
 from push_ros.process import run_node
 from push_ros.task_server import TaskAction
 from push_ros.validation import InvalidMessage, finite

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from push_ros.job_memory import VARIABLE, new_memory
 from push_ros.process import die_with_parent, prepare_environment
 
 _GRACE = 2.5  # [s] after SIGINT, then SIGTERM
@@ -21,7 +22,8 @@ _TAIL = 600  # [characters] kept of a dead node's output
 class Child:
     """A node in a process of its own: ``python -m module words``.
 
-    bag: folder that it writes, when it is a recorder.
+    bag: folder that it writes, when it is a recorder. memory: file in which it keeps its job, for
+    the one that is started in its place; see ``push_ros/job_memory.py``.
     """
 
     name: str
@@ -30,6 +32,7 @@ class Child:
     bag: Path | None = None
     process: "subprocess.Popen[bytes] | None" = None
     deaths: int = 0
+    memory: int | None = None
 
     @property
     def words(self) -> list[str]:
@@ -81,9 +84,14 @@ class Launcher:
             self._open(child, command, file.fileno())
 
     def _open(self, child: Child, command: list[str], output: int | None) -> None:
+        environment, passed = self._environment, list[int]()
+        if self._respawn:
+            child.memory = new_memory() if child.memory is None else child.memory
+            environment, passed = {**environment, VARIABLE: str(child.memory)}, [child.memory]
         child.process = subprocess.Popen(
             command,
-            env=self._environment,
+            env=environment,
+            pass_fds=passed,
             start_new_session=True,
             preexec_fn=die_with_parent,
             stdout=output,
@@ -166,3 +174,7 @@ class Launcher:
                 c.process and c.process.poll() is None for c in alive
             ):
                 time.sleep(0.02)
+        for child in self.children:
+            if child.memory is not None:
+                os.close(child.memory)
+                child.memory = None

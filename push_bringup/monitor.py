@@ -58,7 +58,7 @@ class Monitor:
         self._job = 0  # number of the job that pursues the goal sent; of the one before, until then
         self._begin = self._told = self._looked = 0.0
         self._owner = OwnerWatch(frozenset())
-        self._missed = False
+        self._missed = self._restarted = False
 
     def __enter__(self) -> "Monitor":
         node, self._spinner = self._stack.enter_context(visitor(self._context))
@@ -137,7 +137,7 @@ class Monitor:
     def send_goal(self, goal: Pose) -> None:
         """Publish a goal (x, y, theta) [m, m, rad]."""
         self._goal = (float(goal[0]), float(goal[1]), float(goal[2]))
-        self._news, self._began = [], False
+        self._news, self._began, self._restarted = [], False, False
         self._job = 0 if self.state is None else int(self.state.job)
         self._owner = OwnerWatch(self._owners())
         self._begin, self._told = self.stamp, time.monotonic()
@@ -177,6 +177,8 @@ class Monitor:
                     return result_of(state, self._goal, self.pose, duration, self.team)
             elif state.job < self._job or (self._began and state.job == self._job):
                 return self._forgotten()  # each goal that is taken has a higher number
+            elif self._began and self._restarted:
+                return self._forgotten()
             elif self._began:
                 return self.unfinished("another goal has replaced this one", JobError.PREEMPTED)
         if time.monotonic() - self._looked > _LOOK:
@@ -198,8 +200,9 @@ class Monitor:
         world = int(self._node.count_publishers(self._names.world("poses"))) > 0
         before, self._missed = self._missed, False
         owner = self._owner.look(time.monotonic(), self._owners(), world)
-        if owner is Owner.REPLACED:
-            return self._forgotten()
+        if owner is Owner.REPLACED:  # what it says of the job decides
+            self._restarted, self._owner = True, OwnerWatch(self._owners())
+            self._tell("returned", "the node that owns the job was restarted")
         if owner is Owner.ENDED:
             return self.unfinished("the nodes have ended before the job")
         if owner is Owner.SILENT:

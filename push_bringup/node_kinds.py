@@ -22,6 +22,7 @@ from push_mpc.torque_observer import TorqueObserverSettings
 from push_mpc.torque_tracker import TorqueTrackerSettings
 from push_mpc.wheel_slip_nmpc import WheelSlipSettings
 from push_planner import PlannerSettings
+from push_ros.roster import RosterSettings
 from push_supervisor import SupervisorSettings
 from sim_bridge.settings import BridgeSettings, MotionCaptureSettings, PhysicsSettings
 from swarm_push.swarm_method import SWARM
@@ -79,7 +80,7 @@ def _method_kind(spec: MethodSpec, name: str) -> NodeKind:
         "MethodNode",
         lambda node: {"spec": name, **_team(node)},
         ("world", "robots", "object", "method"),
-        {**spec.sections, "poses": PoseGateSettings},
+        {**spec.sections, **_HOST},
         owner=True,
         commands=True,
         listens=1,
@@ -88,6 +89,7 @@ def _method_kind(spec: MethodSpec, name: str) -> NodeKind:
 
 _TEAM = ("world", "robots", "object")
 _GATED = {"poses": PoseGateSettings}
+_HOST: dict[str, type[Any]] = {**_GATED, "roster": RosterSettings}
 
 KINDS: dict[str, NodeKind] = {
     "bridge": NodeKind(
@@ -134,7 +136,7 @@ KINDS: dict[str, NodeKind] = {
         "make",
         _team,
         _TEAM,
-        {**GROUP.sections, **_GATED},
+        {**GROUP.sections, **_HOST},
         owner=True,
         commands=True,
         listens=1,
@@ -151,7 +153,7 @@ KINDS: dict[str, NodeKind] = {
         "make",
         _team,
         _TEAM,
-        {**SWARM.sections, **_GATED},
+        {**SWARM.sections, **_HOST},
         owner=True,
         commands=True,
         listens=1,

@@ -102,6 +102,11 @@ class PoseGate:
         self.refusal = ""
         self.reset()
 
+    def admit(self, names: Collection[str]) -> None:
+        """Keep the poses of further bodies."""
+        if self.bodies is not None:
+            self.bodies |= frozenset(names)
+
     def reset(self) -> None:
         """Forget all bodies and the clock."""
         self.stamp = 0.0

@@ -12,7 +12,7 @@ hosts one (``push_ros/method_node.py``), a study runs it in the graph, and a not
 
 import importlib
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import entry_points
 from typing import Any, Protocol
@@ -70,11 +70,13 @@ class Told:
 
     commands: by robot; v [m/s] and omega [rad/s] of robots on wheels, vx and vy [m/s] in the fixed
     frame of the others. A robot without one stands. planning: [s] CPU time that planning took in
-    this step; studies charge it.
+    this step; studies charge it. turns: [rad/s] by robot, of those that move in any direction; one
+    without does not turn.
     """
 
     commands: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     planning: float = 0.0
+    turns: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -96,6 +98,17 @@ class Refusal:
 
     code: JobError
     reason: str
+
+
+class SlicedMethod(Protocol):
+    """A method that takes long to assess a task, and can be interrupted meanwhile; optional."""
+
+    def assess_in_slices(
+        self, task: Task, belief: Belief, seen: Seen | None
+    ) -> Generator[int, None, Certificate | Refusal]:
+        """``assess`` in slices of some milliseconds. Yields what each has cost, in microseconds of
+        an idle machine, roughly; returns what ``assess`` does."""
+        ...
 
 
 class Method(Protocol):
@@ -183,7 +196,9 @@ class MethodSpec:
 
     make: a method for an arena; raises Unsuited. sections: classes of its settings by section, ""
     for its own level. check: raises SettingsError for a team that the method cannot drive, given
-    its robots' types by name and the object. example: a scenario to start it with.
+    its robots' types by name and the object. example: a scenario to start it with. open_team:
+    whether robots may join and leave in the middle of a task, so that a node may take in robots
+    that the scenario does not name.
     """
 
     name: str
@@ -191,6 +206,7 @@ class MethodSpec:
     sections: Mapping[str, type[Any]] = field(default_factory=dict)
     check: Callable[[Mapping[str, RobotSpec], ObjectSpec], None] = any_team
     example: str = "swarm-square"
+    open_team: bool = False
 
     def settings(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Settings objects by section, from nested values as a scenario has them.

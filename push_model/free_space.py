@@ -11,7 +11,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from push_model.arrays import Array, Mask
+from push_model.arrays import Array, Mask, Rows
 from push_model.disc_way import disc_way, reliefs, straight_keeps
 from push_model.distance_field import DistanceField, lookup, lookups, square_at
 from push_model.flood import Flood
@@ -100,7 +100,24 @@ class FreeSpace:
     def places(self) -> Array:
         """``(k, 2)`` [m] of the lattice, row by row."""
         rows, columns = self.shape
-        i, j = np.divmod(np.arange(rows * columns), columns)
+        return self.at(np.arange(rows * columns))
+
+    def near(self, point: Array, away: float) -> Rows:
+        """Numbers of the places closer than ``away`` [m] to a point ``(2,)``, the nearest first."""
+        rows, columns = self.shape
+        x, y = self.field.lattice(point) / self.stride
+        reach = away / (self.stride * self.field.spacing)
+        i = np.arange(max(0, math.ceil(y - reach)), min(rows - 1, math.floor(y + reach)) + 1)
+        j = np.arange(max(0, math.ceil(x - reach)), min(columns - 1, math.floor(x + reach)) + 1)
+        gap = np.hypot(*np.meshgrid(i - y, j - x, indexing="ij")).ravel()
+        number = (i[:, None] * columns + j).ravel()
+        some = np.flatnonzero(gap < reach)
+        found: Rows = number[some[np.argsort(gap[some], kind="stable")]]
+        return found
+
+    def at(self, places: Rows) -> Array:
+        """``(n, 2)`` [m] of places by their numbers."""
+        i, j = np.divmod(places, self.shape[1])
         return self.metres(np.column_stack([j, i]) * self.stride)
 
     def metres(self, points: Array) -> Array:
@@ -184,11 +201,25 @@ class Reach:
         self._tip, self._capsules = space.field.lattice(start), space.capsules(among)
 
     @cached_property
+    def _begun(self) -> Flood:
+        stride = self._space.stride
+        return Flood.of_disc(self._field, self._capsules, self._tip, self._need, stride)
+
+    @property
     def _flood(self) -> Flood:
-        space = self._space
-        flood = Flood.of_disc(self._field, self._capsules, self._tip, self._need, space.stride)
-        flood.step(flood.state.size)
-        return flood
+        if not self._begun.done:
+            self._begun.step(self._begun.state.size)
+        return self._begun
+
+    def settle(self, places: int) -> bool:
+        """Look at up to so many more places; whether all have been looked at. The first question
+        about lengths or ways does the rest at once."""
+        return self._begun.step(places)
+
+    @property
+    def reached(self) -> Mask:
+        """Which places ``(k,)`` of the lattice a path leads to."""
+        return self._flood.reached.ravel()
 
     @cached_property
     def lengths(self) -> Array:

@@ -28,6 +28,9 @@ class GoalServer:
     check: raises an exception whose text is logged when the goal must be rejected.
     refuse: result for a goal that is accepted only to be told why it cannot be; None where it can.
     A goal that is rejected or refused leaves the one under way alone.
+    consider: in the place of refuse, for what takes time: called with the request and a function
+    that is to be called once, now or later, with what refuse would have returned. A goal that is
+    canceled meanwhile is not taken.
     preempt: called with the new goal's request before it is taken; the owner ends what is under
     way, whoever asked for it, and a goal of this server with ``finish``.
     start: called with the new goal's request.
@@ -45,11 +48,15 @@ class GoalServer:
         cancel: Callable[[], None],
         preempt: Callable[[Any], None],
         refuse: Callable[[Any], Any] = lambda request: None,
+        consider: Callable[[Any, Callable[[Any], None]], None] | None = None,
     ) -> None:
         self._node = node
         self._check, self._start, self._cancel = check, start, cancel
-        self._preempt, self._refuse = preempt, refuse
+        self._preempt = preempt
+        self._consider = consider or (lambda request, answer: answer(refuse(request)))
         self._handle: Any = None
+        self._considered: list[Any] = []
+        self._result = action.Result
         self._server = _Server(
             node,
             action,
@@ -76,7 +83,13 @@ class GoalServer:
 
     def _on_accepted(self, handle: Any) -> None:
         handle.execute()
-        refusal = self._refuse(handle.request)
+        self._considered.append(handle)
+        self._consider(handle.request, lambda refusal: self._judged(handle, refusal))
+
+    def _judged(self, handle: Any, refusal: Any) -> None:
+        self._considered.remove(handle)
+        if refusal is None and handle.is_cancel_requested:
+            refusal = self._result()
         if refusal is not None:
             self._server.deliver(handle, lambda h: self._deliver(h, refusal, False))
             return
@@ -86,7 +99,10 @@ class GoalServer:
 
     def _on_cancel(self, handle: Any) -> CancelResponse:
         # The handle given here is a copy; compare by goal id.
-        if self._handle is None or bytes(handle.goal_id.uuid) != bytes(self._handle.goal_id.uuid):
+        goal = bytes(handle.goal_id.uuid)
+        if any(bytes(h.goal_id.uuid) == goal for h in self._considered):
+            return CancelResponse.ACCEPT
+        if self._handle is None or goal != bytes(self._handle.goal_id.uuid):
             return CancelResponse.REJECT
         self._cancel()
         return CancelResponse.ACCEPT

@@ -5,27 +5,36 @@ door, with a code and a sentence, and touches no job. One that is already being 
 nothing. Any other one replaces the job under way.
 """
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
 from rclpy.node import Node
+from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from push_job.method import Task
 from push_model import se2
 from push_model.arrays import Array
-from push_model.jobs import GoalRefused, JobError
+from push_model.jobs import GoalRefused, JobError, JobPhase
 from push_msgs.action import MoveObject
 from push_msgs.msg import JobState
 from push_ros.actions import GoalServer
 from push_ros.diagnostics import Diagnostics
+from push_ros.job_keeper import PATIENCE, JobKeeper
+from push_ros.job_memory import JobMemory, KeptJob
 from push_ros.names import Names
 from push_ros.qos import COMMAND, LATCHED
 from push_ros.validation import FRAME, InvalidMessage, stamped_pose
 
 _SAME = 1e-6  # [m], [rad] within which a goal is the one that is pursued
+
+
+Answer = Callable[[GoalRefused | None], None]
+Consider = Callable[[Array, Answer], None]
 
 
 class JobOwner(Protocol):
@@ -57,6 +66,10 @@ class JobOwner(Protocol):
         """Carry out the plan that waits."""
         ...
 
+    def resume(self, job: KeptJob) -> None:
+        """Begin anew with a job that was under way when this node was started again."""
+        ...
+
 
 class JobIntake:
     """Owns ``goal_pose``, ``move_object``, ``execute``, ``cancel``, ``job_state``, ``status_text``.
@@ -73,11 +86,22 @@ class JobIntake:
         system: str,
         robots: Sequence[str],
         item: str,
+        consider: Consider | None = None,
+        memory: JobMemory | None = None,
     ) -> None:
+        """consider: in the place of the owner's ``check_goal``, where that takes time: answers, now
+        or later, with why a goal ``(3,)`` is refused, with None where it can be worked on.
+        memory: of jobs; that of the process if it is not given."""
+        self._keeper = JobKeeper(memory or JobMemory.of_process(), (item, *robots))
+        self._run, self._since = "", math.nan
+        self._consider = consider or self._check
         self._node, self._owner, self._diagnostics = node, owner, diagnostics
         self._item = item
         self._goal: Array | None = None  # of the job under way, or of the last one
         self._state = JobState(system=system, robots=list(robots), object=item)
+        if (kept := self._keeper.pending) is not None:
+            self._state.job = kept.job
+            self._state.goal = deserialize_message(bytes.fromhex(kept.goal), PoseStamped)
         self._state_publisher = node.create_publisher(JobState, names.team("job_state"), LATCHED)
         self._text_publisher = node.create_publisher(String, names.team("status_text"), LATCHED)
         self._goal_topic = names.team("goal_pose")
@@ -86,11 +110,12 @@ class JobIntake:
             MoveObject,
             names.team("move_object"),
             check=lambda request: None,
-            refuse=self._refuse_request,
+            consider=self._consider_request,
             preempt=lambda request: self._make_way(request.goal),
             start=lambda request: self._take(request.goal, bool(request.plan_only)),
             cancel=lambda: self._owner.end_job(JobError.CANCELED, "canceled"),
         )
+        node.create_subscription(String, names.world("world_run"), self._on_run, LATCHED)
         node.create_service(Trigger, names.team("execute"), self._on_execute)
         node.create_service(Trigger, names.team("cancel"), self._on_cancel)
         node.create_subscription(
@@ -125,6 +150,11 @@ class JobIntake:
         for name, value in fields.items():
             setattr(message, name, value)
         message.plan_ready = self._owner.plan_ready
+        if not self._owner.busy and self._keeper.pending is not None:
+            message.state, message.state_name = int(JobPhase.PLANNING), JobPhase.PLANNING.name
+            message.reason = "the node was restarted; its job is taken up when all is known"
+        elif not self._owner.busy and not message.plan_ready:
+            self._keeper.end()
         nanoseconds = round(1e9 * seconds)
         message.header.frame_id = FRAME
         message.header.stamp.sec = nanoseconds // 1_000_000_000
@@ -132,17 +162,91 @@ class JobIntake:
         self._state_publisher.publish(message)
         self._text_publisher.publish(String(data=f"{message.state_name}: {message.reason}"))
 
-    def _parse(self, message: PoseStamped, topic: str) -> Array:
-        """The goal ``(3,)``; raises GoalRefused."""
+    # A job that outlives its node
+
+    def keep(self, task: Task) -> None:
+        """A task begins that did not come as a goal."""
+        goal = bytes(serialize_message(self._state.goal))
+        self._keeper.begin(int(self._state.job), goal, task.targets, task.times)
+
+    def forget(self) -> None:
+        """The node ends in good order: its job ends too."""
+        self._keeper.end()
+
+    def frame(
+        self, stamp: float, bodies: Mapping[str, Array], ready: bool, reached: int = 0
+    ) -> None:
+        """Keep the job under way, or take up the one that was under way when this node was started.
+
+        Parameters
+        ----------
+        stamp: [s] of a frame. bodies: poses ``(3,)`` of the object and the robots that are seen.
+        ready: whether a job could be worked on. reached: targets of the task that are.
+        """
+        pending = self._keeper.pending is not None
+        if not pending and not self._owner.busy and not self._owner.plan_ready:
+            self._keeper.end()
+        self._keeper.see(stamp, self._run, bodies, reached)
+        if not pending:
+            return
+        try:
+            job = self._keeper.judge(stamp, self._run, bodies) if ready else None
+        except GoalRefused as refusal:
+            self._drop(refusal)
+            return
+        if job is not None:
+            self._node.get_logger().warning("the node was restarted; its job is taken up again")
+            targets = tuple(np.array(t) for t in job.targets)
+            self._goal = targets[-1]
+            goal = bytes.fromhex(job.goal)
+            self._keeper.begin(job.job, goal, targets, job.times, job.plan_only)
+            self._owner.resume(job)
+
+    def reset(self) -> None:
+        """The clock has gone back."""
+        if self._keeper.pending is not None:
+            self._drop(GoalRefused(JobError.CLOCK_RESET, "the clock went back"))
+
+    def wait(self, now: float) -> None:
+        """Tell the time [s] on the clock for silence, while no frame comes too."""
+        if self._keeper.pending is not None:
+            self._since = now if math.isnan(self._since) else self._since
+            if now - self._since > PATIENCE:
+                why = f"map, poses or other nodes were missing for {PATIENCE:g} s"
+                self._drop(GoalRefused(JobError.JOB_FORGOTTEN, f"the node was restarted; {why}"))
+
+    def _drop(self, refusal: GoalRefused) -> None:
+        """The job that was under way ends without having been taken up."""
+        self._keeper.end()
+        self._node.get_logger().warning(str(refusal))
+        state = self._state
+        state.state, state.state_name = int(JobPhase.IDLE), JobPhase.IDLE.name
+        state.reason, state.error_code = str(refusal), int(refusal.code)
+        self._state_publisher.publish(state)
+        self._text_publisher.publish(String(data=f"{state.state_name}: {state.reason}"))
+
+    def _on_run(self, message: String) -> None:
+        self._run = str(message.data)
+
+    def _judge(self, message: PoseStamped, topic: str, answer: Answer) -> None:
+        """Answer, now or later, with why a goal is refused, with None where it can be taken."""
         try:
             goal = stamped_pose(message, "the goal")
         except InvalidMessage as error:
             self._diagnostics.refuse(topic, str(error))
             frame = message.header.frame_id != FRAME
             code = JobError.UNKNOWN_FRAME if frame else JobError.INVALID_GOAL
-            raise GoalRefused(code, str(error)) from None
-        self._owner.check_goal(goal)
-        return goal
+            answer(GoalRefused(code, str(error)))
+        else:
+            self._consider(goal, answer)
+
+    def _check(self, goal: Array, answer: Answer) -> None:
+        refusal = None
+        try:
+            self._owner.check_goal(goal)
+        except GoalRefused as error:
+            refusal = error
+        answer(refusal)
 
     def _pursued(self, goal: Array) -> bool:
         """Whether the job under way has this goal."""
@@ -152,24 +256,30 @@ class JobIntake:
         return bool(np.hypot(gap[0], gap[1]) < _SAME and abs(se2.wrap(float(gap[2]))) < _SAME)
 
     def _on_goal_pose(self, message: PoseStamped) -> None:
-        try:
-            self._parse(message, self._goal_topic)
-        except GoalRefused as refusal:
-            self._say_no(message, refusal)
-            return
-        self._make_way(message)
-        self._take(message, False)
+        def judged(refusal: GoalRefused | None) -> None:
+            if refusal is not None:
+                self._say_no(message, refusal)
+                return
+            self._make_way(message)
+            self._take(message, False)
 
-    def _refuse_request(self, request: Any) -> Any:
-        """The result for a goal that cannot be; None where it can."""
-        try:
-            if request.object not in ("", self._item):
-                raise GoalRefused(JobError.UNKNOWN_OBJECT, f"unknown object '{request.object}'")
-            self._parse(request.goal, "move_object")
-        except GoalRefused as refusal:
+        self._judge(message, self._goal_topic, judged)
+
+    def _consider_request(self, request: Any, answer: Callable[[Any], None]) -> None:
+        """Answer with the result for a goal that cannot be, with None where it can."""
+
+        def judged(refusal: GoalRefused | None) -> None:
+            if refusal is None:
+                answer(None)
+                return
             self._say_no(request.goal, refusal)
-            return MoveObject.Result(error_code=int(refusal.code), error_msg=str(refusal))
-        return None
+            answer(MoveObject.Result(error_code=int(refusal.code), error_msg=str(refusal)))
+
+        if request.object not in ("", self._item):
+            text = f"unknown object '{request.object}'"
+            judged(GoalRefused(JobError.UNKNOWN_OBJECT, text))
+            return
+        self._judge(request.goal, "move_object", judged)
 
     def _make_way(self, message: PoseStamped) -> None:
         """End what is under way, unless it is the same."""
@@ -189,6 +299,8 @@ class JobIntake:
             return
         self._goal = goal
         self._state.job += 1
+        kept = bytes(serialize_message(message))
+        self._keeper.begin(int(self._state.job), kept, (goal,), plan_only=plan_only)
         self._owner.take_goal(goal, plan_only)
 
     def _say_no(self, message: PoseStamped, refusal: GoalRefused) -> None:
@@ -208,7 +320,12 @@ class JobIntake:
         return response
 
     def _on_cancel(self, request: Any, response: Any) -> Any:
-        response.success = self._owner.busy or self._owner.plan_ready
-        response.message = "canceled" if response.success else "there is nothing to cancel"
+        refusals = self._state.refusals  # a goal that is still judged is refused
+        some = self._owner.busy or self._owner.plan_ready
+        if self._keeper.pending is not None:
+            some = True
+            self._drop(GoalRefused(JobError.CANCELED, "canceled"))
         self._owner.end_job(JobError.CANCELED, "canceled")
+        response.success = some or self._state.refusals > refusals
+        response.message = "canceled" if response.success else "there is nothing to cancel"
         return response

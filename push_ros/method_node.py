@@ -7,8 +7,7 @@ Every frame is answered with one message for all robots of the team.
 import math
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Generator
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from std_msgs.msg import Header
 
-from push_estimation.pose_gate import PoseGateSettings, Stamp
+from push_estimation.pose_gate import Stamp
 from push_job.method import (
     Arena,
     Method,
@@ -24,49 +23,37 @@ from push_job.method import (
     Refusal,
     Seen,
     Task,
+    Told,
     Unsuited,
-    method_names,
-    method_spec,
 )
 from push_job.report import Status
 from push_model.arrays import Array
 from push_model.drives import HolonomicDrive
 from push_model.jobs import GoalRefused, JobError, JobPhase
 from push_model.occupancy import OccupancyGrid as Grid
-from push_model.settings import SettingsError
 from push_msgs.action import MoveObject
 from push_msgs.msg import Report as ReportMessage
 from push_ros.belief_feed import BeliefFeed
-from push_ros.commander import Commander, TeamCommander
+from push_ros.commander import TeamCommander
 from push_ros.diagnostics import Diagnostics
+from push_ros.door import Door
+from push_ros.hosting import Hosting
 from push_ros.job_intake import JobIntake
+from push_ros.job_memory import JobMemory, KeptJob
 from push_ros.map_feed import MapFeed
+from push_ros.method_settings import chosen_method, declare_method, declare_roster
 from push_ros.names import names_of
-from push_ros.parameters import declare_settings
 from push_ros.pose_feed import Frame, PoseFeed
 from push_ros.process import run_node
 from push_ros.qos import STATUS
 from push_ros.report_conversions import report_to_ros
-from push_ros.task_server import TaskAction, TaskServer
+from push_ros.task_server import TaskServer
 from push_scenario.scenario import Scenario, load_scenario
 
 PATIENCE = 10.0  # [s] without poses of the object after which a task ends
+_SILENCE = 0.3  # [s] without a frame after which goals are judged without
 _REPORTS = 0.05  # [s] of pose time between reports
 _WAITING = Status(int(JobPhase.IDLE), "IDLE", "waiting for a map")
-
-
-@dataclass(frozen=True)
-class Hosting:
-    """What a package adds to the node of its method.
-
-    actions: further actions, made from the node. commander: in the place of the one that sends
-    velocities to all robots. attach: called with the node when it is made, e.g. for clients of
-    other nodes; its result becomes the ``partners`` of the arena.
-    """
-
-    actions: Callable[["MethodNode"], Sequence[TaskAction]] = lambda node: ()
-    commander: Callable[["MethodNode"], Commander | None] = lambda node: None
-    attach: Callable[["MethodNode"], Any] = lambda node: None
 
 
 class MethodNode(Node):
@@ -84,30 +71,29 @@ class MethodNode(Node):
         namespace: str = "",
         world: str = "",
         hosting: Hosting | None = None,
+        memory: JobMemory | None = None,
     ) -> None:
         """spec: the method, or its name; the parameter ``method`` where it is empty. robots, item:
-        the team's. namespace: the team's; world: the bridge's, where it is another one."""
-        chosen = spec if isinstance(spec, MethodSpec) else _chosen(spec) if spec else None
+        the team's. namespace: the team's; world: the bridge's, where it is another one.
+        memory: of jobs, see ``JobIntake``."""
+        chosen = spec if isinstance(spec, MethodSpec) else chosen_method(spec) if spec else None
         kind = chosen.name if chosen is not None else "method"
         super().__init__(kind.replace("-", "_"), namespace=namespace)
         given_name = kind if isinstance(spec, MethodSpec) else spec
         name = str(self.declare_parameter("method", given_name).value)
         if chosen is None:
-            chosen = _chosen(name)
-        self.spec, self._key, hosting = chosen, name, hosting or Hosting()
+            chosen = chosen_method(name)
+        self.spec, hosting = chosen, hosting or Hosting()
         self.names = names = names_of(self, world)
         file = self.declare_parameter("scenario", chosen.example).value
         self.scenario = scenario = scenario or load_scenario(str(file))
         given = self.declare_parameter("robots", list(robots) or [""]).value
-        self.robots = tuple(r for r in given if r) or tuple(scenario.robots)
+        team = tuple(r for r in given if r) or tuple(scenario.robots)
         given_item = str(self.declare_parameter("object", item).value)
-        self.robot_specs = {n: scenario.robot(n)[1] for n in self.robots}
+        self.robot_specs = {n: scenario.robot(n)[1] for n in team}
         self.object, self.item = scenario.object(given_item)
         chosen.check(self.robot_specs, self.item)
-        self._others = {
-            k: r for k, r in scenario.radii.items() if k not in (*self.robots, self.object)
-        }
-        self.settings, gate = self._declare(chosen, scenario)
+        self.settings, gate = declare_method(self, chosen, name, scenario)
         self.method: Method | None = None
         self._why_not = "there is no map yet"
         self._grid: Grid | None = None
@@ -120,15 +106,22 @@ class MethodNode(Node):
         self._diagnostics = Diagnostics(self, names, self._state)
         self.beliefs = BeliefFeed(self, names, scenario, self._diagnostics)
         self.partners = hosting.attach(self)
-        holonomic = isinstance(self.robot_specs[self.robots[0]].drive, HolonomicDrive)
-        self._commander = hosting.commander(self) or TeamCommander(
-            self, names, self.robots, holonomic
+        commander, kind_of = hosting.commander(self), self.robot_specs[team[0]]
+        self._roster = declare_roster(
+            self, scenario, name, team, self.object, chosen.open_team and commander is None
         )
+        holonomic = isinstance(kind_of.drive, HolonomicDrive)
+        self._commander = commander or TeamCommander(self, names, self._roster, holonomic)
         self._reports = self.create_publisher(ReportMessage, names.team("report"), STATUS)
-        bodies = [*self.robots, self.object, *self._others]
-        self._poses = PoseFeed(self, names, gate, bodies, self._diagnostics, self._on_frame)
+        bodies = [*team, self.object, *self._roster.obstacles]
+        self._poses = PoseFeed(
+            *(self, names, gate, bodies, self._diagnostics, self._on_frame), meet=self._meet
+        )
+        self._door = Door(self._judge)
         self._intake = JobIntake(
-            self, names, self._diagnostics, self, chosen.name, list(self.robots), self.object
+            *(self, names, self._diagnostics, self, chosen.name, list(team), self.object),
+            consider=lambda goal, answer: self.consider_task(self._task(goal), answer),
+            memory=memory,
         )
         self._servers = [
             TaskServer(self, names.team(a.name), a, self, self._diagnostics.refuse)
@@ -141,24 +134,14 @@ class MethodNode(Node):
         self._waiting = self._poses.clock.now  # since when the object is not seen
         self._look_after_task()
 
-    def _declare(
-        self, spec: MethodSpec, scenario: Scenario
-    ) -> tuple[dict[str, Any], PoseGateSettings]:
-        values = dict(scenario.parameters.get(self._key, {}))
-        sections = {k: values.pop(k, {}) for k in (*spec.sections, "poses") if k}
-        made = {
-            k: declare_settings(self, cls, sections[k], k, f"{spec.name}.{k}")
-            for k, cls in spec.sections.items()
-            if k
-        }
-        if "" in spec.sections:
-            made[""] = declare_settings(self, spec.sections[""], values, where=spec.name)
-        elif values:
-            raise SettingsError(f"{spec.name}: unknown key '{next(iter(values))}'")
-        gate = declare_settings(
-            self, PoseGateSettings, sections["poses"], "poses", f"{spec.name}.poses"
-        )
-        return made, gate
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """Names of the team's robots, further ones too."""
+        return self._roster.robots
+
+    def _meet(self, names: Collection[str]) -> Collection[str]:
+        self._roster.meet(names, self.object)
+        return (*self._roster.robots, *self._roster.obstacles)
 
     @property
     def ready(self) -> bool:
@@ -190,6 +173,14 @@ class MethodNode(Node):
     def execute(self) -> None:
         """See JobOwner; there is never a plan that waits."""
 
+    def resume(self, job: KeptJob) -> None:
+        """See JobOwner."""
+        self.take_task(Task(tuple(np.array(t) for t in job.targets)))
+
+    def stop(self) -> None:
+        """The process ends in good order."""
+        self._intake.forget()
+
     def check_goal(self, goal: Array) -> None:
         """See JobOwner."""
         self.check_task(self._task(goal))
@@ -208,28 +199,42 @@ class MethodNode(Node):
 
     def end_job(self, code: JobError, message: str) -> None:
         """See JobOwner."""
+        if code is JobError.CANCELED:
+            self._door.drop(code, message)
         if self.method is not None:
             self.method.end(code, message)
         self._look_after_task()
 
     # The host of tasks, see TaskHost
 
-    def check_task(self, task: Task) -> None:
+    def consider_task(self, task: Task, answer: Callable[[GoalRefused | None], None]) -> None:
         """See TaskHost."""
+        self._door.ask(task, answer)
+
+    def check_task(self, task: Task) -> None:
+        """Raise GoalRefused unless a task can be worked on; at once."""
+        for _ in self._judge(task):
+            pass
+
+    def _judge(self, task: Task) -> Generator[int, None, None]:
+        method = self.method
         if self._grid is None:
             return  # it is found out when the map comes
-        if self.method is None:
+        if method is None:
             raise GoalRefused(JobError.PLANNING_FAILED, self._why_not)
         for target in task.targets:
             if not self._grid.contains(float(target[0]), float(target[1])):
                 raise GoalRefused(JobError.OUTSIDE_MAP, "the goal is outside the map")
-        found = self.method.assess(task, self.beliefs.current, self._seen)
+        asked = task, self.beliefs.current, self._seen
+        slices = getattr(method, "assess_in_slices", None)
+        found = method.assess(*asked) if slices is None else (yield from slices(*asked))
         if isinstance(found, Refusal):
             raise GoalRefused(found.code, found.reason)
 
     def take_task(self, task: Task) -> None:
         """See TaskHost."""
         self._waiting, self._missing = self._poses.clock.now, 0.0
+        self._intake.keep(task)
         if self.method is not None:
             self.method.begin(task, self.beliefs.current)
         self._look_after_task()
@@ -237,6 +242,7 @@ class MethodNode(Node):
     # The world
 
     def _take_map(self, grid: Grid) -> None:
+        self._door.drop(JobError.PREEMPTED, "the map has changed")
         self.end_job(JobError.PREEMPTED, "the map has changed")
         self._grid = grid
         arena = Arena(grid, self.robot_specs, self.object, self.item, self.settings, self.partners)
@@ -248,37 +254,50 @@ class MethodNode(Node):
 
     def _on_frame(self, frame: Frame) -> None:
         self._stamp = frame.stamp
-        commands: Mapping[str, tuple[float, float]] = {}
+        told = Told()
         if frame.verdict is Stamp.RESET:
             self._reported = -math.inf
             if self.method is not None:
                 self.method.revive()
+            self._door.drop(JobError.CLOCK_RESET, "the clock went back")
+            self._intake.reset()
             self.end_job(JobError.CLOCK_RESET, "the clock went back")
         elif frame.verdict is not Stamp.REFUSED:
-            commands = self._step(frame)
-        self._commander.send(self._stamp, commands)
+            told = self._step(frame)
+        self._commander.send(self._stamp, told)
+        self._door.go_on()
+        if frame.verdict is not Stamp.REFUSED:
+            ready = self.ready and self.method is not None and self._seen is not None
+            self._intake.frame(self._poses.stamp, self._bodies(), ready, self.status.index)
         self._look_after_task()
 
-    def _step(self, frame: Frame) -> Mapping[str, tuple[float, float]]:
-        """Commands by name; robots without one stand."""
+    def _bodies(self) -> dict[str, Array]:
+        """Poses of the object and the robots that are seen."""
+        named = ((n, self._poses.pose(n)) for n in (self.object, *self.robots))
+        return {n: pose for n, pose in named if pose is not None}
+
+    def _step(self, frame: Frame) -> Told:
+        """What the method says; nothing where nobody has to move."""
         method, item = self.method, self._poses.pose(self.object)
         if item is None:
             self._missing += frame.elapsed
             if self._missing > PATIENCE:
                 self.end_job(JobError.POSES_STALE, f"no poses of '{self.object}'")
-            return {}
+            return Told()
         self._missing, self._waiting = 0.0, self._poses.clock.now
         robots = {n: p for n in self.robots if (p := self._poses.pose(n)) is not None}
-        self._seen = seen = Seen(self._poses.stamp, item, robots, self._poses.discs(self._others))
+        self._seen = seen = Seen(
+            self._poses.stamp, item, robots, self._poses.discs(self._roster.obstacles)
+        )
         if method is None or not self.busy:
-            return {}
+            return Told()
         began = time.thread_time()
         told = method.step(seen, self.beliefs.current)
         cost = time.thread_time() - began
         self.planning_time += told.planning
         if seen.time - self._reported >= _REPORTS - 1e-9:
             self._report(method, seen, cost)
-        return told.commands
+        return told
 
     def _report(self, method: Method, seen: Seen, cost: float) -> None:
         report = method.report(seen)
@@ -292,6 +311,9 @@ class MethodNode(Node):
     def _on_watchdog(self) -> None:
         """For when no frame comes; in lockstep, where the world waits, nothing happens."""
         now = self._poses.clock.now
+        self._intake.wait(now)
+        if self._poses.paused or self._poses.silence > _SILENCE:
+            self._door.go_on()
         if not self.busy:
             self._waiting = now
         elif now - self._waiting > PATIENCE and self._poses.silence > PATIENCE:
@@ -313,6 +335,7 @@ class MethodNode(Node):
     def _publish_status(self, status: Status) -> None:
         self._intake.publish(
             self._poses.stamp,
+            robots=list(self.robots),
             state=int(status.phase),
             state_name=status.name,
             reason=status.reason,
@@ -364,14 +387,6 @@ class MethodNode(Node):
             "poses refused": self._poses.gate.refused,
             "warning": "no poses" if self._poses.pose(self.object) is None else "",
         }
-
-
-def _chosen(name: str) -> MethodSpec:
-    spec = method_spec(name)
-    if spec is None:
-        known = ", ".join(method_names())
-        raise SettingsError(f"no method called '{name}'; expected one of: {known}, or MODULE:NAME")
-    return spec
 
 
 def main() -> int:

@@ -37,11 +37,12 @@ def declare_settings(
         SettingsError to refuse. Without it the parameters are read-only.
     """
     defaults = from_mapping(cls, values, where)
+    hints = typing.get_type_hints(cls)
     names = {f.name: f"{prefix}.{f.name}" if prefix else f.name for f in dataclasses.fields(cls)}  # type: ignore[arg-type]
     for field in dataclasses.fields(cls):  # type: ignore[arg-type]
         value = getattr(defaults, field.name)
-        if isinstance(value, tuple):
-            value = list(value)
+        if isinstance(value, tuple):  # of an empty list nobody knows the type
+            value = list(value) or ([""] if hints[field.name] == tuple[str, ...] else [])
         # A descriptor belongs to one parameter: rclpy changes the one it is given.
         descriptor = _descriptor(cls, field, read_only=apply is None)
         node.declare_parameter(names[field.name], value, descriptor)

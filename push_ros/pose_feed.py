@@ -47,16 +47,19 @@ class PoseFeed:
         diagnostics: Diagnostics,
         on_frame: Callable[[Frame], None],
         period: float = 0.0,
+        meet: Callable[[Collection[str]], Collection[str]] = lambda names: (),
     ) -> None:
         """bodies: whose poses are wanted; others are not kept. period: [s] frames that follow the
-        last one sooner are not even deserialised."""
+        last one sooner are not even deserialised. meet: called when a frame names other bodies than
+        the one before; those that it returns are wanted too, from the next frame on."""
         self.gate = PoseGate(settings, bodies)
         self.topic = names.world("poses")
         self.clock = LivenessClock(node, names, lambda: self.gate.stamp)
         self._node = node
         self._diagnostics = diagnostics
         self._on_frame = on_frame
-        self._period = period
+        self._period, self._meet = period, meet
+        self._names: list[str] = []
         self._last = self.clock.now
         node.create_subscription(
             Poses,
@@ -130,6 +133,9 @@ class PoseFeed:
                 self.gate.refused += 1
                 self._diagnostics.refuse(self.topic, text)
             seen = frozenset(name for name, pose in poses.items() if self.gate.accept(name, pose))
+            if message.names != self._names:
+                self._names = list(message.names)
+                self.gate.admit(self._meet(self._names))
         known = verdict is Stamp.OK and before > 0.0
         elapsed = self.gate.stamp - before if known else 0.0
         self._on_frame(Frame(message.header.stamp, verdict, seen, elapsed))

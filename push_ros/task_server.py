@@ -30,8 +30,8 @@ class TaskAction:
 class TaskHost(Protocol):
     """The node that works on tasks."""
 
-    def check_task(self, task: Task) -> None:
-        """Raise GoalRefused unless the task can be worked on."""
+    def consider_task(self, task: Task, answer: Callable[[GoalRefused | None], None]) -> None:
+        """Answer, now or later, with why a task is refused, with None where it can be worked on."""
         ...
 
     def take_task(self, task: Task) -> None:
@@ -62,7 +62,7 @@ class TaskServer:
             spec.action,
             name,
             check=lambda request: None,
-            refuse=self._refuse,
+            consider=self._consider,
             start=lambda request: host.take_task(spec.parse(request)),
             cancel=lambda: host.end_job(JobError.CANCELED, "canceled"),
             preempt=lambda request: host.end_job(
@@ -81,16 +81,21 @@ class TaskServer:
             success = common["error_code"] == int(JobError.NONE)
             self._server.finish(self._spec.result(common, status), success=success)
 
-    def _refuse(self, request: Any) -> Any:
-        """The result for a task that cannot be; None where it can."""
+    def _consider(self, request: Any, answer: Callable[[Any], None]) -> None:
+        """Answer with the result for a task that cannot be, with None where it can."""
+
+        def judged(refusal: GoalRefused | None) -> None:
+            answer(None if refusal is None else self._answer(refusal.code, str(refusal)))
+
         try:
-            self._host.check_task(self._spec.parse(request))
+            task = self._spec.parse(request)
         except InvalidMessage as error:
             self._refused(self._spec.name, str(error))
-            return self._answer(JobError.INVALID_GOAL, str(error))
+            judged(GoalRefused(JobError.INVALID_GOAL, str(error)))
         except GoalRefused as refusal:
-            return self._answer(refusal.code, str(refusal))
-        return None
+            judged(refusal)
+        else:
+            self._host.consider_task(task, judged)
 
     def _answer(self, code: JobError, text: str) -> Any:
         return self._spec.action.Result(error_code=int(code), error_msg=text)

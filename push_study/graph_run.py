@@ -1,7 +1,6 @@
 """A whole run in one process: every node on one executor, in lockstep, repeatable to the bit."""
 
 import os
-import time
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -25,6 +24,7 @@ from push_ros.claims import claim_domain
 from push_ros.names import Names, space
 from push_ros.process import Spinner, prepare_environment
 from push_scenario.scenario import Scenario
+from push_study.discovery import Discovery
 from push_study.observer import Observer
 
 _ROLES = ("controller", "planner", "supervisor")
@@ -146,24 +146,33 @@ class LockstepRun:
             self.spinner.close()
         self._stack.close()
 
-    def connect(self, limit: float = 300.0) -> None:
-        """Wait until all parts know each other; nothing moves before."""
+    def connect(self) -> None:
+        """Wait until all parts know each other; nothing moves before.
+
+        No clock limits the wait, see ``push_study/discovery.py``.
+
+        Raises
+        ------
+        NotDiscovered: they will not.
+        """
         assert self.spinner is not None
         teams = list(self.teams.values())
 
-        def connected() -> bool:
+        def parts() -> tuple[object, ...]:
             return (
-                all(t.supervisor.ready and t.planner.ready for t in teams)
-                and len(self.bridge.commanded()) == self._commanded
-                and bool(self.bridge.heard_by(self._listeners))
-                and all(t.observer.connected for t in teams)
+                *(bool(t.supervisor.ready) for t in teams),
+                *(bool(t.planner.ready) for t in teams),
+                *(t.observer.connected for t in teams),
+                len(self.bridge.commanded()) >= self._commanded,
+                bool(self.bridge.heard_by(self._listeners)),
             )
 
-        if not self.spinner.until(connected, limit):
-            raise RuntimeError("the nodes did not find each other")
-        # Endpoints are matched a moment after they are known.
-        end = time.monotonic() + 0.5
-        self.spinner.until(lambda: time.monotonic() > end, 1.0)
+        discovery = Discovery(self.observer, self.spinner)
+        discovery.wait(
+            lambda: (*parts(), len(self.bridge.commanded()), *self.observer.endpoints()),
+            lambda: all(parts()),
+        )
+        discovery.settle()
 
     def start(self) -> None:
         """Connect and begin to step."""

@@ -4,7 +4,7 @@ Whoever controls the group sees poses and gives twists, 50 times a second, as a 
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from types import TracebackType
 
 import numpy as np
@@ -86,12 +86,12 @@ class GroupWorld:
         noise = self._random.normal(0.0, 1.0, (1 + len(robots), 3)) * self._noise
         return item + noise[0], robots + noise[1:]
 
-    def step(self, twists: Array) -> None:
+    def step(self, twists: Array, turns: Mapping[str, float] | None = None) -> None:
         """Go on by a tick; twists ``(n, 2)`` v [m/s], omega [rad/s], of robots that go in any
-        direction vx, vy [m/s] in the world's frame."""
+        direction vx, vy [m/s] in the world's frame; turns: their omega [rad/s] by name."""
         if self._holonomic:
-            still = np.zeros(len(self.names))
-            self._world.command_all(self.names, np.column_stack([twists, still]), fixed_frame=True)
+            omega = [0.0 if turns is None else turns.get(n, 0.0) for n in self.names]
+            self._world.command_all(self.names, np.column_stack([twists, omega]), fixed_frame=True)
         else:
             for name, (v, omega) in zip(self.names, twists, strict=True):
                 self._world.command(name, float(v), float(omega))

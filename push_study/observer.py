@@ -68,6 +68,12 @@ class Observer(Node):
             and heard(self, self._goal_publisher)
         )
 
+    def endpoints(self) -> tuple[int, int]:
+        """Publishers and subscriptions of the topics that matter for a run, as far as known."""
+        topics = [s.topic_name for s in self.subscriptions] + [self._goal_publisher.topic_name]
+        publishers = sum(int(self.count_publishers(t)) for t in topics)
+        return publishers, sum(int(self.count_subscribers(t)) for t in topics)
+
     def send_goal(self, goal: Array) -> None:
         """Publish a goal ``(3,)`` on /goal_pose."""
         self._goal_publisher.publish(pose_stamped_to_ros(goal, 0.0))

@@ -19,6 +19,7 @@ from push_msgs.action import MoveObject
 from push_ros.belief_feed import BeliefFeed
 from push_ros.diagnostics import Diagnostics
 from push_ros.job_intake import JobIntake
+from push_ros.job_memory import KeptJob
 from push_ros.map_feed import MapFeed
 from push_ros.names import names_of
 from push_ros.parameters import declare_settings
@@ -151,6 +152,14 @@ class SupervisorNode(Node):
         """See JobOwner."""
         self._fire(events.ExecuteCommanded())
 
+    def resume(self, job: KeptJob) -> None:
+        """See JobOwner."""
+        self.take_goal(np.array(job.targets[-1]), job.plan_only)
+
+    def stop(self) -> None:
+        """The process ends in good order."""
+        self._intake.forget()
+
     # The world
 
     def _take_map(self, grid: Grid) -> None:
@@ -180,9 +189,12 @@ class SupervisorNode(Node):
             return
         if frame.verdict is Stamp.RESET:
             self._fire(events.ClockReset())
+            self._intake.reset()
         self._ticks += 1
         self._heartbeat_publisher.publish(Header(stamp=frame.stamp, frame_id=FRAME))
         self._tend()
+        seen = {n: p for n in (self.object, self.robot) if (p := self._pose(n)) is not None}
+        self._intake.frame(self._poses.stamp, seen, self.ready and len(seen) == 2)
         if self._ticks % 2 == 0:
             self._watch_displacement()
             if self._intake.waited_for:
@@ -190,6 +202,7 @@ class SupervisorNode(Node):
 
     def _on_watchdog(self) -> None:
         """Wall time, for when no frames come; in lockstep there is always one to come."""
+        self._intake.wait(self._poses.clock.now)
         if self._poses.silence > 0.3:
             self._tend()
 

@@ -111,6 +111,7 @@ class BridgeNode(Node):
 
     def _restart(self) -> None:
         self.tick = 0
+        self.outputs.begin()
         self._capture.reset(self._seed)
         self._disturbances.restart()
         self._intake.restart()

@@ -1,5 +1,6 @@
 """What the bridge tells of its world. Messages that nobody reads are not even made."""
 
+import os
 from collections.abc import Sequence
 from typing import Any
 
@@ -59,6 +60,7 @@ class WorldPublishers:
         self.paused(False)
         self._lockstep = make(Bool, name("lockstep"), LATCHED)
         self._lockstep.publish(Bool(data=lockstep))
+        self._run, self._runs = make(String, name("world_run"), LATCHED), 0
         self._joints: dict[str, Any] = {}
         self._heard: Sequence[str] = ()
 
@@ -76,6 +78,11 @@ class WorldPublishers:
             if isinstance(spec.drive, DifferentialDrive)
         }
         self._heard = ()
+
+    def begin(self) -> None:
+        """The world is at its start: a run of its own, told from all others."""
+        self._runs += 1
+        self._run.publish(String(data=f"{os.getpid()}.{self._runs}"))
 
     def paused(self, paused: bool) -> None:
         """Whether the world stands still."""

@@ -96,6 +96,7 @@ class SwarmAgentNode(Node):
 
     def _declare(self, scenario: Scenario) -> tuple[dict[str, Any], PoseGateSettings]:
         values = dict(scenario.parameters.get("swarm", {}))
+        values.pop("roster", None)  # each robot has a node of its own
         classes = {**SECTIONS, "poses": PoseGateSettings}
         sections = {k: values.pop(k, {}) for k in classes if k}
         made: dict[str, Any] = {
@@ -154,6 +155,7 @@ class SwarmAgentNode(Node):
             own = self._poses.pose(self.robot)
             turned = se2.rotation_matrix(-float(own[2])) @ twist if own is not None else twist
             message.twist.linear.x, message.twist.linear.y = (float(v) for v in turned)
+            message.twist.angular.z = float(self.agent.job.turns.get(self.robot, 0.0))
         else:
             message.twist.linear.x, message.twist.angular.z = twist
         self._commands.publish(message)

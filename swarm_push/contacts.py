@@ -39,6 +39,14 @@ class Contacts:
         rows = self.pairs[(self.pairs == index).any(axis=1)]
         return set(rows.ravel().tolist()) - {index}
 
+    def jam(self, index: int) -> set[int]:
+        """Robots that press on one of them, directly or through others."""
+        found, front = {index}, {index}
+        while front:
+            front = set().union(*(self.neighbours(k) for k in front)) - found
+            found |= front
+        return found - {index}
+
     def away(self, index: int) -> Array:
         """``(2,)`` unit vector, world frame, that leads away from what touches a robot; zero where
         nothing does, or where contacts on all sides cancel."""

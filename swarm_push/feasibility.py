@@ -3,12 +3,16 @@
 Refused is only what is shown to be impossible: an object that no placement of the robots at hand
 can keep sliding (``rim_capacity.py``), a target that no way leads to, robots that walls keep from
 the object. What is accepted may still fail.
+
+In a large room with walls this takes half a second. ``slices`` therefore does it in parts between
+which a node goes on with its other work; ``assess`` does it at once.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
 from copy import copy
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -29,7 +33,13 @@ _SPARE = 0.01  # [m] that ways of robots keep from walls
 _NEAR = 0.2  # [m] from a robot within which it joins the lattice
 _PACE = 0.7  # mean speed of a push over the robots' greatest speed, as measured
 _AMPLE = 1.8  # force at best over what is needed above which swarms moved objects, as measured
+_SLICE = 500  # poses of the object that are checked, about, before an assessment can be interrupted
+_PER_PLACE = 10  # places that a flood reaches in the time of one such check
+_PER_SLICE = 5  # robots for which a place to join the lattice is looked for, likewise
+_TRIED = 8  # places that are tried
+_PROGRAMME = 1000  # checks that take as long as a linear programme
 _GATHER = 1.5  # ways of robots round each other and the object over straight ones, likewise
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
@@ -96,27 +106,37 @@ class Feasibility:
         self._radius, self._speed = robot.footprint_radius, robot.max_speed
         self._lever = float(np.hypot(*item.geometry.outline.T).max())
         self._grid, self._track = grid, track
-        self._space: FreeSpace | None = None
+        known = None if track is None else track.field
+        self._space = None if grid is None else FreeSpace(known or grid, _LATTICE)
 
     def assess(self, target: Array, pose: Array, robots: Mapping[str, Array]) -> Assessment:
         """Of a target ``(3,)``, its heading nan where any will do, for an object at a pose
         ``(3,)``, both of the centre of mass, and robots at poses ``(3,)`` by name."""
-        able = self._able(pose, robots)
-        way, aim = self._straight(pose, target), target
+        return at_once(self.slices(target, pose, robots))
+
+    def slices(
+        self, target: Array, pose: Array, robots: Mapping[str, Array]
+    ) -> Generator[int, None, Assessment]:
+        """``assess`` in slices: yields what each has cost, in poses of the object that could have
+        been checked in its time (1 to 3 microseconds each); returns the assessment."""
         refusal, least = self._no_place(target), least_contacts(target)
+        way, aim = self._straight(pose, target), target
+        able = yield from self._able(pose, robots)
         if refusal is None and self._track is not None:
             track = copy(self._track)  # so that the way that is under way stays
             try:
-                track.plan(pose, target, np.zeros((0, 3)))
+                track.begin(pose, target, np.zeros((0, 3)))
+                while not track.search(_SLICE):
+                    yield _SLICE
                 way, (aim, _) = track.left(pose), track.aim(pose)
             except NoObjectWay as error:
                 refusal = JobError.PLANNING_FAILED, str(error)
         twists = self._twists(pose, aim)
-        needed = self._needed(twists, least)
+        needed = yield from self._needed(twists, least)
         force = max((self.capacity.needed_force(t) for t in twists), default=0.0)
-        available = self._available(twists, len(able))
+        available = yield from self._available(twists, len(able))
         if refusal is None:
-            refusal = self._too_few(force, available, twists, least, len(able), len(robots))
+            refusal = _too_few(force, available, needed, least, len(able), len(robots))
         code, reason = refusal or (JobError.NONE, "")
         seconds = self._gathering(pose, able) + way / (_PACE * self._speed)
         return Assessment(code, reason, len(able), needed, force, available, way, seconds)
@@ -126,52 +146,31 @@ class Feasibility:
         ``(3,)``."""
         twists = self._twists(pose, target)[:1]
         force = max((self.capacity.needed_force(t) for t in twists), default=0.0)
-        available = self._available(twists, robots)
+        available = at_once(self._available(twists, robots))
         if available >= force:
             return Strength(force, available, None)
-        text = self._heavy(twists, force, available, least_contacts(target))
-        return Strength(force, available, text)
+        needed = at_once(self._needed(twists, least_contacts(target)))
+        return Strength(force, available, _heavy(force, available, needed))
 
-    def _needed(self, twists: list[Array], least: int) -> int | None:
+    def _needed(self, twists: list[Array], least: int) -> Generator[int, None, int | None]:
         """The fewest robots that may do for all of some twists ``(3,)`` in the object's frame; None
         where no number of them does."""
-        counts = [self.capacity.least_robots(t) for t in twists]
-        if not counts or None in counts:
-            return None if counts else 0
-        return max(least, *(c for c in counts if c is not None))
+        most = least if twists else 0
+        for twist in twists:
+            count = self.capacity.least_robots(twist)
+            yield 4 * _PROGRAMME
+            if count is None:
+                return None
+            most = max(most, count)
+        return most
 
-    def _too_few(
-        self,
-        force: float,
-        available: float,
-        twists: list[Array],
-        least: int,
-        able: int,
-        seen: int,
-    ) -> tuple[JobError, str] | None:
-        if not twists:
-            return None
-        if not able:
-            text = f"none of {seen} robots can get to the object" if seen else "no robot is seen"
-            return JobError.POSITIONING_FAILED, text
-        if available < force:
-            return JobError.TOO_HEAVY, self._heavy(twists, force, available, least)
-        return (JobError.POSITIONING_FAILED, too_few(able, least)) if able < least else None
-
-    def _heavy(self, twists: list[Array], force: float, available: float, least: int) -> str:
-        """The refusal, with its numbers."""
-        text = f"too heavy: {_forces(force, available)}"
-        needed = self._needed(twists, least)
-        if needed is None:
-            return f"{text}, and no more robots find room where it is pushed from"
-        return f"{text}; at least {counted(needed)} are needed"
-
-    def _available(self, twists: list[Array], robots: int) -> float:
+    def _available(self, twists: list[Array], robots: int) -> Generator[int, None, float]:
         """[N] for the twist for which least is available of what it takes."""
-        parts = [
-            (self.capacity.available_force(t, robots), self.capacity.needed_force(t))
-            for t in twists
-        ]
+        parts = []
+        for twist in twists:
+            made = self.capacity.available_force(twist, robots)
+            parts.append((made, self.capacity.needed_force(twist)))
+            yield _PROGRAMME
         if not parts:
             return 0.0
         part = min(a / f for a, f in parts)
@@ -200,25 +199,25 @@ class Feasibility:
             return JobError.GOAL_OCCUPIED, "the object does not fit at the target"
         return None
 
-    def _able(self, pose: Array, robots: Mapping[str, Array]) -> list[Array]:
+    def _able(self, pose: Array, robots: Mapping[str, Array]) -> Generator[int, None, list[Array]]:
         """Places ``(2,)`` of the robots that can get to the object."""
         points = [p[:2] for p in robots.values()]
-        if self._grid is None or not points:
-            return points
-        if self._space is None:
-            self._space = FreeSpace(self._grid, _LATTICE)
         space, among = self._space, Obstacles()
+        if space is None or not points:
+            return points
         reach = space.from_here(pose[:2], self._radius + _SPARE, among)
-        places = space.places[np.isfinite(reach.lengths)]
-        if not len(places):
-            return []
+        while not reach.settle(_SLICE * _PER_PLACE):
+            yield _SLICE
+        reached = reach.reached
         found = []
-        for point in points:
-            away = np.hypot(*(places - point).T)
-            near = np.argsort(away, kind="stable")[:8]
-            near = near[away[near] < _NEAR]
-            if any(space.line_keeps(point, places[k], self._radius, among) for k in near):
+        for count, point in enumerate(points):
+            near = space.near(point, _NEAR)
+            near = near[reached[near]][:_TRIED]
+            ends = space.at(near)
+            if any(space.line_keeps(point, end, self._radius, among) for end in ends):
                 found.append(point)
+            if count % _PER_SLICE == 0:
+                yield _SLICE
         return found
 
     def _gathering(self, pose: Array, points: list[Array]) -> float:
@@ -228,6 +227,37 @@ class Feasibility:
         away = np.hypot(*(np.array(points) - pose[:2]).T) - self._lever
         way = max(0.0, float(np.median(away))) + 0.5 * math.pi * self._lever
         return _GATHER * way / self._speed
+
+
+def at_once(work: Generator[int, None, _T]) -> _T:
+    """What a work in slices comes to, done to its end."""
+    while True:
+        try:
+            next(work)
+        except StopIteration as end:
+            found: _T = end.value
+            return found
+
+
+def _too_few(
+    force: float, available: float, needed: int | None, least: int, able: int, seen: int
+) -> tuple[JobError, str] | None:
+    if force <= 0.0:
+        return None
+    if not able:
+        text = f"none of {seen} robots can get to the object" if seen else "no robot is seen"
+        return JobError.POSITIONING_FAILED, text
+    if available < force:
+        return JobError.TOO_HEAVY, _heavy(force, available, needed)
+    return (JobError.POSITIONING_FAILED, too_few(able, least)) if able < least else None
+
+
+def _heavy(force: float, available: float, needed: int | None) -> str:
+    """The refusal, with its numbers."""
+    text = f"too heavy: {_forces(force, available)}"
+    if needed is None:
+        return f"{text}, and no more robots find room where it is pushed from"
+    return f"{text}; at least {counted(needed)} are needed"
 
 
 def counted(robots: int) -> str:

@@ -5,8 +5,10 @@ does not yield, stand in a jam, or touch something that is not where it is belie
 is commanded test motions, one after the other, and is declared dead only if it carries out none.
 A robot on wheels is commanded to turn in place, both ways, because a healthy robot can turn among
 any neighbours that do not press on it; then to drive away from what touches it. A robot that moves
-in any direction is commanded away from what touches it, then in the other directions. If the first
-test motion fails, robots in contact with the suspect stop pressing until its test is over.
+in any direction is commanded away from what touches it, then to turn in place, then in the other
+directions. If the first test motion fails, robots in contact with the suspect stop pressing until
+its test is over. Robots that move in any direction have little torque and hold their places against
+a load: those that press on the suspect, also through others, then draw back from it.
 """
 
 from collections.abc import Mapping
@@ -24,6 +26,7 @@ _RATE, _TIME = 2.5, 1.0  # [rad/s], [s] of a turn in place
 _TURNED = 0.5  # [rad] of it that show that a robot is alive
 _SPEED, _DRIVE = 0.06, 0.5  # [m/s], [s] of a drive
 _MOVED = 6e-3  # [m] of it, along the command, that show that a robot is alive
+_EASE = 0.03  # [m/s] at which robots draw back from one that is tested
 _LEAVE = 0.7  # [s] for which a robot that has passed leaves the jam
 
 
@@ -62,16 +65,17 @@ class LivenessSettings:
 @dataclass(frozen=True)
 class _Motion:
     """A test motion: for so long [s], a twist v [m/s], omega [rad/s], or a velocity ``(2,)`` [m/s]
-    in the world frame where ``fixed``."""
+    in the world frame where ``fixed``, with a turn [rad/s]."""
 
     time: float
     twist: tuple[float, float]
     fixed: bool
+    turn: float = 0.0
 
     def done(self, start: Array, pose: Array) -> bool:
         """Whether a robot carried it out that was at one pose ``(3,)`` and is at another."""
         first, second = self.twist
-        if not self.fixed and second:
+        if self.turn or (not self.fixed and second):
             return abs(se2.wrap(float(pose[2] - start[2]))) >= _TURNED
         way = np.array([first, second]) if self.fixed else first * _ahead(float(start[2]))
         return float((pose - start)[:2] @ way) >= _MOVED * float(np.hypot(*way))
@@ -87,6 +91,9 @@ class _Test:
     start: Array
     first: bool = True
     leaving: bool = False
+
+    def __post_init__(self) -> None:
+        self.away = self.motions[0].twist  # the way out of the jam, as far as is known
 
     def judge(self, now: float, pose: Array, leave: _Motion | None) -> bool | None:
         """Whether the robot is alive, once that is known; until then the test goes on."""
@@ -124,6 +131,12 @@ class LivenessCheck:
         self._roster: dict[str, int] = {}  # every robot ever seen, and its place in what follows
         self._poses = np.zeros((0, 3))  # where each was last seen
         self._loose = self._stuck = ActuationMonitor(0, 1.0, 1.0)
+
+    @property
+    def turns(self) -> dict[str, float]:
+        """Turn rates [rad/s] of robots that move in any direction and are told to turn in place."""
+        tests = {**self._tests, **self._retests}
+        return {n: t.motions[0].turn for n, t in tests.items() if t.motions[0].turn}
 
     def step(
         self, now: float, names: tuple[str, ...], poses: Array, twists: Array, contacts: Contacts
@@ -181,7 +194,10 @@ class LivenessCheck:
         if not self._wheels:
             x, y = away if away.any() else (1.0, 0.0)
             ways = ((x, y), (-y, x), (y, -x), (-x, -y))
-            return [_Motion(_DRIVE, (_SPEED * float(a), _SPEED * float(b)), True) for a, b in ways]
+            drives = [
+                _Motion(_DRIVE, (_SPEED * float(a), _SPEED * float(b)), True) for a, b in ways
+            ]
+            return [drives[0], _Motion(_DRIVE, (0.0, 0.0), True, _RATE), *drives[1:]]
         turns = [_Motion(_TIME, (0.0, _RATE), False), _Motion(_TIME, (0.0, -_RATE), False)]
         if not touched:
             return turns
@@ -206,7 +222,8 @@ class LivenessCheck:
                 continue
             leave = _Motion(_LEAVE, (_SPEED, 0.0), False)
             if not self._wheels:
-                leave = _Motion(_LEAVE, test.motions[0].twist, True)
+                way = test.motions[0].twist if not test.motions[0].turn else test.away
+                leave = _Motion(_LEAVE, way, True)
             alive = test.judge(now, poses[i], leave)
             if alive is not None:
                 over.append(name)
@@ -217,10 +234,14 @@ class LivenessCheck:
                 continue
             twists[i] = 0.0
             twists[i, :2] = test.motions[0].twist
+            if not self._wheels:
+                twists[i, 2] = test.motions[0].turn
             if not test.first and not test.leaving:
-                for j in contacts.neighbours(i):
+                for j in contacts.neighbours(i) if self._wheels else contacts.jam(i):
                     if names[j] not in self._tests:
                         twists[j] = 0.0
+                        if not self._wheels:
+                            twists[j, :2] = _EASE * _away(poses[i], poses[j])
         for name in over:  # a robot that has proved alive has all its time again
             del self._tests[name]
             self._loose.restart(self._roster[name])
@@ -241,6 +262,13 @@ class LivenessCheck:
         places = np.array([self._roster[n] for n in names], dtype=np.intp)
         self._poses[places] = poses
         return places
+
+
+def _away(here: Array, there: Array) -> Array:
+    """``(2,)`` unit vector from one pose to another; zero where they coincide."""
+    way = (there - here)[:2]
+    unit: Array = way / max(float(np.hypot(*way)), 1e-9)
+    return unit
 
 
 def _ahead(heading: float) -> Array:

@@ -6,17 +6,17 @@ commands; it then only takes goals, watches, and tells how the task stands.
 
 import math
 import sys
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from push_job.method import Task
+from push_job.method import Task, Told
 from push_job.report import Status
 from push_model.jobs import GoalRefused, JobError
 from push_msgs.action import SwarmMove
 from push_msgs.msg import SwarmTarget
-from push_ros.method_node import Hosting, MethodNode
+from push_ros.hosting import Hosting
+from push_ros.method_node import MethodNode
 from push_ros.process import run_node
 from push_ros.qos import COMMAND
 from push_ros.task_server import TaskAction
@@ -38,7 +38,7 @@ class TargetCommander:
             SwarmTarget, node.names.team("swarm_target"), COMMAND
         )
 
-    def send(self, stamp: Any, commands: Mapping[str, tuple[float, float]]) -> None:
+    def send(self, stamp: Any, told: Told) -> None:
         """See Commander."""
         job = getattr(self._node.method, "job", None)
         target = job.target if job is not None and job.busy else None

@@ -4,7 +4,7 @@ Robots may come, leave and die meanwhile: whoever is seen and does as it is told
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -111,6 +111,12 @@ class SwarmJob:
         return frozenset(self._liveness.dead)
 
     @property
+    def turns(self) -> Mapping[str, float]:
+        """Turn rates [rad/s], beside the commands of the last step, of robots that move in any
+        direction and are tested whether they move at all."""
+        return self._liveness.turns if self.busy and self.holonomic else {}
+
+    @property
     def targets(self) -> tuple[Array, ...]:
         """Of the job, poses ``(3,)`` of the centre of mass, headings nan where any will do."""
         return self._queue.poses
@@ -134,6 +140,12 @@ class SwarmJob:
         """Of a target before it is begun: whether it can be reached, by how many robots, with which
         margin. Arguments as of ``step``; a job that is under way is not touched."""
         return self._feasibility.assess(target, pose, robots)
+
+    def assess_in_slices(
+        self, target: Array, pose: Array, robots: Mapping[str, Array]
+    ) -> Generator[int, None, Assessment]:
+        """``assess`` in slices, see ``Feasibility.slices``."""
+        return self._feasibility.slices(target, pose, robots)
 
     def begin(self, targets: Sequence[Array]) -> None:
         """Take targets, at least one; no job is under way."""

@@ -1,7 +1,7 @@
 """The swarm as a method: the adapter between ``SwarmJob`` and whatever hosts methods."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from push_model.specs import ObjectSpec, RobotSpec
 from swarm_push.agent import AgentSettings
 from swarm_push.coverage import Coverage
 from swarm_push.crescent_law import CrescentLawSettings
+from swarm_push.feasibility import at_once
 from swarm_push.laws import LawSections, LawSettings
 from swarm_push.object_track import TrackSettings
 from swarm_push.region import covered_region, is_open
@@ -89,6 +90,12 @@ class SwarmMethod:
     def assess(self, task: Task, belief: Belief, seen: Seen | None) -> Certificate | Refusal:
         """See Method: whether the object fits at every target, a way leads there, and the robots
         that are seen can push it. The margin is the force to spare over the force needed."""
+        return at_once(self.assess_in_slices(task, belief, seen))
+
+    def assess_in_slices(
+        self, task: Task, belief: Belief, seen: Seen | None
+    ) -> Generator[int, None, Certificate | Refusal]:
+        """See SlicedMethod."""
         item = belief.object(self._arena.object)
         if item != self._item and not self.job.busy:
             self._take_up(belief)
@@ -100,7 +107,7 @@ class SwarmMethod:
             return Certificate()
         pose, robots, margin, seconds = item.mass_pose(seen.object), 1, math.inf, 0.0
         for target in targets:
-            found = self.job.assess(target, pose, seen.robots)
+            found = yield from self.job.assess_in_slices(target, pose, seen.robots)
             if not found.accepted:
                 return Refusal(found.code, found.reason)
             heading = pose[2] if math.isnan(target[2]) else target[2]
@@ -120,7 +127,8 @@ class SwarmMethod:
         """See Method."""
         self._take_up(belief)
         pose = self._item.mass_pose(seen.object)
-        return Told(self.job.step(seen.time, pose, seen.robots, seen.obstacles))
+        commands = self.job.step(seen.time, pose, seen.robots, seen.obstacles)
+        return Told(commands, turns=self.job.turns)
 
     def report(self, seen: Seen) -> Report | None:
         """See Method: density, cells and centroids, and how far it is to the target."""
@@ -160,7 +168,7 @@ class SwarmMethod:
     def release(self) -> frozenset[str]:
         """See Method: all robots when no task is under way, the dead at any time."""
         if self.job.state is JobPhase.IDLE:
-            return frozenset(self._arena.robots)
+            return frozenset((*self._arena.robots, *self.job.taking_part))
         return self.job.dead
 
     def errors(self, seen: Seen) -> tuple[float, float]:
@@ -195,4 +203,4 @@ def check_team(robots: Mapping[str, RobotSpec], item: ObjectSpec) -> None:
         raise SettingsError("has robots without a ring bumper and a controlled velocity")
 
 
-SWARM = MethodSpec("swarm", SwarmMethod, SECTIONS, check_team, "swarm-square")
+SWARM = MethodSpec("swarm", SwarmMethod, SECTIONS, check_team, "swarm-square", open_team=True)

@@ -80,7 +80,6 @@ DECIDES_NOTHING = {
     "push_record/player.py": "plays a bag; there is no bridge beside it",
     "push_record/recorder.py": "stamps of a live bag",
     "push_study/progress.py": PERSON,
-    "push_study/graph_run.py:LockstepRun.connect": START,
     "push_ros/method_node.py:MethodNode.__init__": LIVE,
     "push_ros/method_node.py:MethodNode._step": COST,
     "grasp_opt/plan_source.py": COST,

@@ -44,14 +44,19 @@ def test_another_publisher_in_its_place_is_another_node():
 class OwnerNode:
     """Owns jobs, and tells of them as it is told to."""
 
-    def __init__(self, job=0):
+    @classmethod
+    def resumed(cls, job, goal):
+        """One that was started in the place of another and goes on with its job."""
+        return cls(job, JobState.PUSHING, "the node was restarted", goal)
+
+    def __init__(self, job=0, state=JobState.IDLE, reason="waiting for a goal", goal=None):
         self.node = rclpy.create_node("owner")
         self.heard = []
         self.node.create_subscription(PoseStamped, "/goal_pose", self.heard.append, COMMAND)
         self.publisher = self.node.create_publisher(JobState, "/job_state", LATCHED)
         self.spinner = Spinner([self.node])
         self.job = job
-        self.tell(JobState.IDLE, "waiting for a goal", PoseStamped())
+        self.tell(state, reason, goal or PoseStamped())
 
     def tell(self, state, reason, goal, code=0):
         name = {JobState.IDLE: "IDLE", JobState.PUSHING: "PUSHING"}[state]
@@ -115,6 +120,34 @@ def test_a_restarted_owner_has_forgotten_the_job(world, taken):
     result = polled(monitor)
     assert result.code is JobError.JOB_FORGOTTEN and not result.success
     assert "restarted" in result.reason and "send the goal again" in result.reason
+
+
+@pytest.mark.parametrize("seen", [True, False])
+def test_a_restarted_owner_that_has_taken_the_job_up_again_is_followed_to_the_end(world, seen):
+    """It says so with the number and the goal of the job; seen: while the dead one is in the
+    graph."""
+    monitor, events, owners, _ = world
+    goal, dead = owners[0].heard[-1], owners.pop()
+    if not seen:
+        dead.close()
+        assert monitor.wait(15.0, lambda: not monitor.supervised)
+    owners.append(OwnerNode.resumed(4, goal))
+    assert monitor.wait(15.0, lambda: "restarted" in monitor.state.reason)
+    dead.close()
+    monitor.wait(1.0, lambda: monitor.poll() is not None)
+    assert "returned" in [e.kind for e in events]
+    owners[0].tell(JobState.IDLE, "the goal is reached", goal)
+    result = polled(monitor)
+    assert result.code is JobError.NONE and result.success
+
+
+def test_a_restarted_owner_that_takes_others_goals_has_forgotten_ours(world):
+    """Even where its count of jobs is beyond ours."""
+    monitor, _, owners, _ = world
+    owners.pop().close()
+    monitor.wait(1.0, lambda: monitor.poll() is not None)
+    owners.append(OwnerNode.resumed(9, PoseStamped()))
+    assert polled(monitor).code is JobError.JOB_FORGOTTEN
 
 
 def test_an_owner_that_is_missed_is_waited_for_and_told_of(world, monkeypatch):

@@ -154,3 +154,45 @@ def test_a_refused_goal_gets_its_own_result_and_leaves_the_other_alone(world):
     world.server.finish(MoveObject.Result(pushes=2), success=True)
     assert world.until(lambda: first)
     assert first[0].result.pushes == 2 and first[0].status == GoalStatus.STATUS_SUCCEEDED
+
+
+@pytest.fixture
+def slow(ros):
+    """A server that answers whether it takes a goal when it is told to."""
+    world = World()
+    world.asked = []
+    world.server._consider = lambda request, answer: world.asked.append(answer)
+    yield world
+    world.close()
+
+
+def test_a_goal_that_is_judged_for_a_while_leaves_the_one_under_way_alone(slow):
+    results = {"a": [], "b": [], "c": []}
+    plain = GoalClient(slow.node, MoveObject, "/job")
+    slow.client.send(MoveObject.Goal(object="a"), results["a"].append)
+    assert slow.until(lambda: len(slow.asked) == 1) and not slow.started
+    slow.asked[0](None)
+    assert slow.until(lambda: slow.started == ["a"])
+    plain.send(MoveObject.Goal(object="b"), results["b"].append)
+    assert slow.until(lambda: len(slow.asked) == 2)
+    assert slow.server.active and not results["a"]
+    slow.asked[1](MoveObject.Result(error_code=306))
+    assert slow.until(lambda: bool(results["b"]))
+    assert results["b"][0].error_code == 306 and slow.server.active and not results["a"]
+    plain.send(MoveObject.Goal(object="c"), results["c"].append)
+    assert slow.until(lambda: len(slow.asked) == 3)
+    slow.asked[2](None)
+    assert slow.until(lambda: slow.started == ["a", "c"] and bool(results["a"]))
+    assert results["a"][0].error_code == 311
+
+
+def test_a_goal_that_is_canceled_while_it_is_judged_is_not_taken(slow):
+    sent = slow.plain.send_goal_async(MoveObject.Goal(object="a"))
+    assert slow.until(lambda: sent.done() and len(slow.asked) == 1)
+    handle = sent.result()
+    answer, canceled = handle.get_result_async(), handle.cancel_goal_async()
+    assert slow.until(canceled.done) and canceled.result().goals_canceling
+    slow.asked[0](None)
+    assert slow.until(answer.done)
+    assert answer.result().status == GoalStatus.STATUS_CANCELED
+    assert not slow.started and not slow.canceled and not slow.server.active

@@ -108,9 +108,9 @@ def test_the_dead_stay_dead_when_they_are_tried_again_and_who_turns_is_back():
     assert not roll.dead
 
 
-def discs(free, until, touched=True, contacts=None):
+def discs(free, until, touched=True, turning=()):
     """Three discs that are told to go along x at 0.1 m/s; disc k moves in directions ``free[k]``
-    alone. The dead, and all commands."""
+    alone, and turns if it is among the turning. The dead, and all commands."""
     roll, poses, time, told = call(wheels=False), stand(), 0.0, []
     while time < until:
         alive = tuple(n for n in NAMES if n not in roll.dead)
@@ -124,6 +124,8 @@ def discs(free, until, touched=True, contacts=None):
             for n, t in roll.try_again(time, dict(zip(NAMES, poses, strict=True))).items()
         }
         told.append(both)
+        for name, omega in roll.turns.items():
+            poses[NAMES.index(name), 2] += DT * omega * (NAMES.index(name) in turning)
         for name, speed in both.items():
             k = NAMES.index(name)
             for way in free[k]:
@@ -153,6 +155,28 @@ def test_dead_discs_are_found_out_and_stay_dead_when_they_are_tried_again():
     assert set(dead) == {"b", "c"}
     tried = [k * DT for k, t in enumerate(told) if "b" in t and k * DT > 12.0]
     assert tried and 30.0 < tried[0] < 42.0
+
+
+@pytest.mark.parametrize("touched", [True, False])
+def test_a_disc_that_is_jammed_on_all_sides_lives_as_long_as_it_can_turn(touched):
+    """In a jam, or between walls, which nobody counts as contacts; one that cannot is dead."""
+    assert set(discs(((AHEAD, BACK), (), ()), 60.0, touched, turning=(1,))[0]) == {"c"}
+    assert not discs(((), (), ()), 60.0, touched, turning=(0, 1, 2))[0]
+
+
+def test_discs_draw_back_from_one_that_is_tested_and_cannot_move_at_once():
+    """Disc b in the middle of a row; who presses on it through another one draws back too."""
+    names, time, drawn = ("a", "b", "c", "d"), 0.0, set()
+    roll = LivenessCheck(LivenessSettings(), wheels=False)
+    poses = np.array([[-0.1, 0.0, 0.0], [0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.2, 0.0, 0.0]])
+    wanted = np.array([[0.0, 0, 0], [0.1, 0.0, 0.0], [0.0, 0, 0], [0.0, 0, 0]])
+    while time < 9.0 and "b" not in roll.dead:
+        at = find_contacts(np.array([9.0, 9, 0]), SQUARE, poses[:, :2], 0.05, np.zeros((0, 3)))
+        twists = roll.step(time, names, poses, wanted, at)
+        drawn |= {(n, float(np.sign(twists[k, 0]))) for k, n in enumerate(names) if n != "b"}
+        time += DT
+    assert {("a", -1.0), ("c", 1.0), ("d", 1.0)} <= drawn
+    assert not drawn & {("a", 1.0), ("c", -1.0), ("d", -1.0)}
 
 
 def test_neighbours_stop_pressing_while_a_robot_is_tested_that_did_not_turn_at_once():

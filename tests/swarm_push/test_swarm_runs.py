@@ -11,12 +11,14 @@ import pytest
 
 from push_model import se2
 from push_model.jobs import JobError
+from push_model.occupancy import rasterise
 from push_model.shape_specs import PolygonShape
 from push_model.specs import EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
 from push_study.group_world import GroupWorld
 from push_study.rooms import around as starts
 from push_study.uncertainty import uncertainty
+from swarm_push.region import covered_region
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
 
 HALF = 2.0
@@ -50,7 +52,7 @@ def run(seed, limit, scale=1.0, kill=0, robot="epuck_ring", **changes):
             pose, robots = world.see()
             here = dict(zip(world.names, robots, strict=True))
             twists = job.step(world.time, item.mass_pose(pose), here, NONE)
-            world.step(np.array([twists[n] for n in world.names]))
+            world.step(np.array([twists[n] for n in world.names]), job.turns)
             declared |= job.dead
         pose = item.mass_pose(world.truth()[0])
     away = float(np.hypot(*(pose - target)[:2]))
@@ -91,6 +93,53 @@ def test_no_live_robot_is_declared_dead_in_100_runs(robot):
 def test_dead_robots_are_found_out_all_the_same(seed, scale, robot):
     _, wrong, found, _ = run(seed, 25.0, scale, kill=2, robot=robot)
     assert not wrong and found == {"e0", "e1"}
+
+
+def jam(seed, count, kill=0, limit=35.0):
+    """Discs crowd about an object that is far heavier than believed, in a room that is little
+    larger. Those that were declared dead and were not, and those that were dead and found out."""
+    random, disc = np.random.default_rng([seed, 5]), load_robot("disc")
+    item, radius, half = load_object(OBJECTS[seed % len(OBJECTS)]), disc.footprint_radius, 0.75
+    lever, spots = float(np.hypot(*item.outline.T).max()) + radius + 0.01, []
+    while len(spots) < count:
+        spot = random.uniform(radius + 5e-3 - half, half - radius - 5e-3, 2)
+        if np.hypot(*spot) > lever and all(
+            np.hypot(*(spot - s[:2])) > 2.0 * radius + 5e-3 for s in spots
+        ):
+            spots.append([*spot, random.uniform(-3.0, 3.0)])
+    room = EnvironmentSpec((2 * half, 2 * half), resolution=0.02)
+    grid = rasterise(room)
+    settings = SwarmJobSettings(stalled=600.0)
+    job, declared = SwarmJob(covered_region(grid, radius), item, disc, settings, grid=grid), set()
+    job.begin([np.array([*random.uniform(-0.3, 0.3, 2), random.uniform(-3.0, 3.0)])])
+    heavy = replace(item, mass=60.0)
+    with GroupWorld(
+        room, disc, np.array(spots), heavy, np.zeros(3), uncertainty("mild"), seed, "planar"
+    ) as world:
+        dead = set(world.names[:kill])
+        world.kill(world.names[:kill])
+        while world.time < limit and job.busy:
+            pose, robots = world.see()
+            here = dict(zip(world.names, robots, strict=True))
+            twists = job.step(world.time, item.mass_pose(pose), here, NONE)
+            world.step(np.array([twists[n] for n in world.names]), job.turns)
+            declared |= job.dead
+    return declared - dead, declared & dead
+
+
+@pytest.mark.parametrize(("seed", "count", "kill"), [(0, 16, 0), (1, 20, 2)])
+def test_no_disc_is_declared_dead_that_is_jammed_at_an_object_that_does_not_move(seed, count, kill):
+    wrong, found = jam(seed, count, kill)
+    assert not wrong and len(found) == kill
+
+
+@pytest.mark.study
+def test_no_jammed_disc_is_declared_dead_in_60_runs_and_the_dead_are_found():
+    runs = [jam(k, (12, 16, 20)[k % 3], (0, 2)[k % 2], 60.0) for k in range(60)]
+    assert not any(wrong for wrong, _ in runs), [k for k in range(60) if runs[k][0]]
+    found = sum(len(f) for _, f in runs)
+    print(f"{found} of 60 dead discs found out")  # one that nobody commands to go is not judged
+    assert found > 50
 
 
 def test_one_robot_that_cannot_turn_the_object_says_so():

@@ -1,0 +1,124 @@
+"""Takes a job up again after the node that owns it has died and was started again.
+
+While a job is under way, what is needed to go on with it is kept (``job_memory.py``). The node that
+is started in the place of a dead one goes on only if nothing speaks against it: it is the same run
+of the world, its clock has not gone back, not much time has passed, and object and robots are where
+they were. Robots stand meanwhile, because nobody commands them. No ROS here.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from push_model import se2
+from push_model.arrays import Array
+from push_model.jobs import GoalRefused, JobError
+from push_ros.job_memory import JobMemory, KeptJob
+
+_EVERY = 0.2  # [s] of pose time between two times at which a job is kept
+_LONGEST = 60.0  # [s] of pose time after which a job is not taken up again
+PATIENCE = 30.0
+"""[s] that a node waits after its restart until a job can be taken up."""
+_MOST_RESTARTS = 3  # of the node during one job: it may die of the job
+_ITEM_WAY, _ITEM_TURN = 0.1, 0.5  # [m], [rad] that the object may have moved meanwhile
+_ROBOT_WAY = 0.2  # [m] that a robot may have moved meanwhile: it stops after 0.2 s
+
+
+class JobKeeper:
+    """Of one node. pending: a job that was under way when the node before this one died, and has
+    not been taken up yet."""
+
+    def __init__(self, memory: JobMemory, team: tuple[str, ...]) -> None:
+        """team: object, then robots."""
+        self._memory, self._team = memory, team
+        self._current: KeptJob | None = None
+        self._seen: tuple[float, str, Mapping[str, Array]] = (-math.inf, "", {})
+        self.pending: KeptJob | None = None
+        kept = memory.read()
+        if kept is not None and kept.team == team:
+            self.pending = replace(kept, restarts=kept.restarts + 1)
+        memory.write(self.pending)
+
+    def begin(
+        self,
+        job: int,
+        goal: bytes,
+        targets: tuple[Array, ...],
+        times: tuple[float, ...] = (),
+        plan_only: bool = False,
+    ) -> None:
+        """A job begins; see ``KeptJob``. One of the same number goes on."""
+        before = self.pending or self._current
+        restarts = before.restarts if before is not None and before.job == job else 0
+        self.pending = None
+        poses = tuple(tuple(float(v) for v in t) for t in targets)
+        self._current = KeptJob(
+            self._team, job, goal.hex(), poses, times, plan_only, restarts=restarts
+        )
+        self._keep(self._current, 0)
+
+    def end(self) -> None:
+        """There is no job any more."""
+        if self._current is not None or self.pending is not None:
+            self._current = self.pending = None
+            self._memory.write(None)
+
+    def see(self, stamp: float, world: str, bodies: Mapping[str, Array], reached: int) -> None:
+        """Keep the job under way as it stands in a frame of a stamp [s]. reached: targets."""
+        self._seen = stamp, world, bodies
+        job = self._current
+        if job is not None and not 0.0 <= stamp - job.stamp < _EVERY:
+            self._keep(job, reached)
+
+    def _keep(self, job: KeptJob, reached: int) -> None:
+        """As the job stands in the newest frame."""
+        stamp, world, bodies = self._seen
+        rows = tuple((n, float(p[0]), float(p[1]), float(p[2])) for n, p in bodies.items())
+        self._current = job = replace(job, stamp=stamp, world=world, bodies=rows)
+        left = job.targets[min(reached, len(job.targets) - 1) :] if not job.times else job.targets
+        self._memory.write(replace(job, targets=left))
+
+    def judge(self, stamp: float, world: str, bodies: Mapping[str, Array]) -> KeptJob | None:
+        """The pending job, if it can be taken up in a frame; None where more has to be known.
+
+        Raises
+        ------
+        GoalRefused: it must not be taken up.
+        """
+        job = self.pending
+        if job is None:
+            return None
+        if stamp < job.stamp or (world and job.world and world != job.world):
+            raise GoalRefused(JobError.CLOCK_RESET, "the world was reset while the node was away")
+        if job.times:
+            raise _forgotten("a trajectory cannot be taken up in the middle")
+        if job.restarts > _MOST_RESTARTS:
+            raise _forgotten(f"the node has died {job.restarts} times during this job")
+        if stamp - job.stamp > _LONGEST:
+            raise _forgotten(f"the node was away for {stamp - job.stamp:.0f} s")
+        if job.world and not world:
+            return None
+        item = self._team[0]
+        before = {n: np.array(pose) for n, *pose in job.bodies}
+        if item not in bodies:
+            return None
+        for name, pose in bodies.items():
+            if name not in before:
+                continue
+            off = se2.between(before[name], pose)
+            way, turn = float(np.hypot(off[0], off[1])), abs(float(off[2]))
+            if way > (_ITEM_WAY if name == item else _ROBOT_WAY) or (
+                name == item and turn > _ITEM_TURN
+            ):
+                raise _forgotten(
+                    f"somebody moved '{name}' while the node was away: {1e3 * way:.0f} mm, "
+                    f"{turn:.2f} rad"
+                )
+        return job
+
+
+def _forgotten(why: str) -> GoalRefused:
+    text = f"the node was restarted and has not taken its job up again: {why}; send the goal again"
+    return GoalRefused(JobError.JOB_FORGOTTEN, text)

@@ -1,0 +1,67 @@
+"""Nodes of a run wait for each other by what the middleware has done, not by a clock."""
+
+import itertools
+
+import pytest
+import rclpy
+
+from push_ros.process import Spinner
+from push_study.discovery import Discovery, NotDiscovered
+from push_study.graph_run import LockstepRun
+from tests.system.test_swarm import running
+
+
+@pytest.fixture
+def discovery(ros):
+    node = rclpy.create_node("waiting")
+    spinner = Spinner([node])
+    yield Discovery(node, spinner, probes=20, between=1)
+    spinner.close()
+
+
+def test_probes_are_heard_and_leave_nothing_behind(discovery):
+    node = discovery._node
+    before = len(list(node.publishers)), len(list(node.subscriptions))
+    discovery.settle()
+    assert (len(list(node.publishers)), len(list(node.subscriptions))) == before
+
+
+def test_it_waits_as_long_as_anything_changes_and_for_a_while_when_nothing_does(discovery):
+    calls = itertools.count()
+    discovery.wait(lambda: next(calls) // 30, lambda: next(calls) > 200)  # a change now and then
+    left = iter([False] * 38)
+    discovery.wait(lambda: 0, lambda: next(left, True))  # none, but done before it gives up
+
+
+def test_nodes_that_will_not_find_each_other_are_given_up(discovery):
+    with pytest.raises(NotDiscovered, match=r"20 endpoints .* nothing else has changed: \(False"):
+        discovery.wait(lambda: (False, 3), lambda: False)
+
+
+def test_a_run_whose_owner_is_never_ready_ends_and_says_what_is_missing(monkeypatch):
+    monkeypatch.setattr("push_study.graph_run.Discovery", few_probes)
+    with running() as run:
+        monkeypatch.setattr(type(run.supervisor), "ready", False)
+        with pytest.raises(NotDiscovered, match="did not find each other"):
+            run.connect()
+        assert run.bridge.time == 0.0
+
+
+def few_probes(node, spinner):
+    return Discovery(node, spinner, probes=20, between=1)
+
+
+def test_no_clock_decides_whether_a_run_connects(monkeypatch):
+    """A machine on which an hour passes from each look at the clock to the next."""
+    hours = itertools.count(0.0, 3600.0)
+    with running() as run:
+        monkeypatch.setattr("time.monotonic", lambda: next(hours))
+        run.connect()
+        assert run.supervisor.ready and run.bridge.time == 0.0
+
+
+def test_a_run_connects_and_steps(monkeypatch):
+    assert "limit" not in LockstepRun.connect.__annotations__
+    with running() as run:
+        run.start()
+        assert run.spin_until(lambda: run.bridge.time > 0.2, 1.0)
