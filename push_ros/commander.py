@@ -5,6 +5,7 @@ from typing import Any, Protocol
 
 from rclpy.node import Node
 
+from push_job.method import Command
 from push_msgs.msg import Velocities
 from push_ros.names import Names
 from push_ros.qos import COMMAND
@@ -14,7 +15,7 @@ from push_ros.validation import FRAME
 class Commander(Protocol):
     """Sends what a method says in answer to a frame."""
 
-    def send(self, stamp: Any, commands: Mapping[str, tuple[float, float]]) -> None:
+    def send(self, stamp: Any, commands: Mapping[str, Command]) -> None:
         """stamp: of the frame; commands: by robot, see ``Told``."""
         ...
 
@@ -26,12 +27,14 @@ class TeamCommander:
         self._robots, self._holonomic = list(robots), holonomic
         self._publisher = node.create_publisher(Velocities, names.world("cmd_vels"), COMMAND)
 
-    def send(self, stamp: Any, commands: Mapping[str, tuple[float, float]]) -> None:
+    def send(self, stamp: Any, commands: Mapping[str, Command]) -> None:
         """See Commander."""
         told = [commands.get(name, (0.0, 0.0)) for name in self._robots]
-        first, second = [float(a) for a, _ in told], [float(b) for _, b in told]
+        first, second = [float(c[0]) for c in told], [float(c[1]) for c in told]
         if self._holonomic:
             message = Velocities(names=self._robots, vx=first, vy=second)
+            if any(len(c) > 2 for c in told):
+                message.omega = [float(sum(c[2:])) for c in told]
             message.header.frame_id = FRAME
         else:
             message = Velocities(names=self._robots, vx=first, omega=second)

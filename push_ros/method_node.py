@@ -19,6 +19,7 @@ from std_msgs.msg import Header
 from push_estimation.pose_gate import PoseGateSettings, Stamp
 from push_job.method import (
     Arena,
+    Command,
     Method,
     MethodSpec,
     Refusal,
@@ -248,7 +249,7 @@ class MethodNode(Node):
 
     def _on_frame(self, frame: Frame) -> None:
         self._stamp = frame.stamp
-        commands: Mapping[str, tuple[float, float]] = {}
+        commands: Mapping[str, Command] = {}
         if frame.verdict is Stamp.RESET:
             self._reported = -math.inf
             if self.method is not None:
@@ -259,7 +260,7 @@ class MethodNode(Node):
         self._commander.send(self._stamp, commands)
         self._look_after_task()
 
-    def _step(self, frame: Frame) -> Mapping[str, tuple[float, float]]:
+    def _step(self, frame: Frame) -> Mapping[str, Command]:
         """Commands by name; robots without one stand."""
         method, item = self.method, self._poses.pose(self.object)
         if item is None:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from push_job.method import Task
+from push_job.method import Command, Task
 from push_job.report import Status
 from push_model.jobs import GoalRefused, JobError
 from push_msgs.action import SwarmMove
@@ -38,7 +38,7 @@ class TargetCommander:
             SwarmTarget, node.names.team("swarm_target"), COMMAND
         )
 
-    def send(self, stamp: Any, commands: Mapping[str, tuple[float, float]]) -> None:
+    def send(self, stamp: Any, commands: Mapping[str, Command]) -> None:
         """See Commander."""
         job = getattr(self._node.method, "job", None)
         target = job.target if job is not None and job.busy else None
