@@ -32,6 +32,7 @@ from push_model.traction import lift_share, push_force, standing_traction
 
 _MOST = 5  # robots that are placed at once
 _ROOMS = (1.0, 0.5, 0.1)  # of the room round the object, one after another
+_POSES = 20_000  # that a slice of the search for the object's way checks, 20 to 60 ms
 _LOOKED_AT = 0.04  # [m] between poses of a piece at which places are looked at
 _PARTS = (1.0, 0.75, 0.5, 0.35, 0.25, 0.15, 0.08)  # of a trajectory that no placement holds whole
 
@@ -222,8 +223,11 @@ class StepPlanner:
         why: Exception = NoStep("there is no way for the object")
         for finder in self._finders:
             yield
+            search = finder.search(scene.pose, goal, among)
+            while not search.step(_POSES):
+                yield
             try:
-                way = pieces(finder.way(scene.pose, goal, among))
+                way = pieces(search.way)
             except NoObjectWay as error:
                 why = NoStep(str(error))
                 continue
