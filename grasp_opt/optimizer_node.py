@@ -17,7 +17,8 @@ from grasp_opt.group_messages import plan_to_ros, trajectory_from_ros
 from grasp_opt.placement import PlacementSettings
 from grasp_opt.sequencing import NoStep
 from grasp_opt.slices import Work
-from grasp_opt.step_planner import GroupPlan, Scene, StepPlanner, StepSettings, TooFew
+from grasp_opt.step_planner import GroupPlan, Scene, StepPlanner, TooFew
+from grasp_opt.step_settings import StepSettings
 from grasp_opt.warm_up import warm_up
 from push_model.belief import Belief
 from push_model.occupancy import OccupancyGrid as Grid
