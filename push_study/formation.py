@@ -232,10 +232,18 @@ def push(
     )
     if outcome.code is not JobError.NONE:
         raise RuntimeError(outcome.reason)
-    since = np.array(times) - methods[-1].began
+    began = methods[-1].began
+    since = np.array(times) - began
     pushing = (since > -1e-6) & (since < trajectory.duration + 0.5 / _EXACT.rate + 1e-6)
     return _judged(
-        item, contacts, trajectory, radius, since[pushing], np.array(tables)[pushing], outcome
+        item,
+        contacts,
+        trajectory,
+        radius,
+        since[pushing],
+        np.array(tables)[pushing],
+        began,
+        outcome,
     )
 
 
@@ -246,13 +254,15 @@ def _judged(
     radius: float,
     time: Array,
     poses: Array,
+    began: float,
     outcome: Outcome,
 ) -> FormationPush:
     """What a run amounts to, from time ``(t,)`` [s] along the trajectory and poses ``(t, 1 + n,
-    3)`` of object and discs."""
+    3)`` of object and discs; began: [s] of its first frame."""
     way = np.array([item.mass_pose(p) for p in poses[:, 0]])
     agents = poses[:, 1:, :2]
-    felt = np.array(outcome.trace.forces)[-len(time) :][1:]
+    since = np.array(outcome.trace.force_times) - began
+    felt = np.array(outcome.trace.forces)[(since > time[0] + 1e-6) & (since < time[-1] + 1e-6)]
     wanted = np.array([trajectory.sample(t) for t in time])
     astray = float(np.hypot(*(way - wanted)[:, :2].T).max())
     late = time > 0.5
