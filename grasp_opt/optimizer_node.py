@@ -7,7 +7,6 @@ be cancelled at any time.
 
 import sys
 import time
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,11 +14,12 @@ from nav_msgs.msg import Path
 from rclpy.node import Node
 
 from grasp_opt.group_messages import plan_to_ros, trajectory_from_ros
-from grasp_opt.object_trajectory import screw
-from grasp_opt.placement import NoPlacement, PlacementSettings, robust_placement
+from grasp_opt.placement import PlacementSettings
 from grasp_opt.sequencing import NoStep
 from grasp_opt.slices import Work
-from grasp_opt.step_planner import GroupPlan, Scene, StepPlanner, StepSettings, TooFew
+from grasp_opt.step_planner import GroupPlan, Scene, StepPlanner, TooFew
+from grasp_opt.step_settings import StepSettings
+from grasp_opt.warm_up import warm_up
 from push_model.belief import Belief
 from push_model.occupancy import OccupancyGrid as Grid
 from push_model.settings import SettingsError
@@ -97,7 +97,8 @@ class OptimizerNode(Node):
             cancel=lambda: self._fail(PlanGroupPush.Result.CANCELED, "canceled"),
             preempt=lambda request: self._preempt(),
         )
-        self._warm_up()
+        if failure := warm_up(self._item, self._robot, self._weights):
+            self.get_logger().debug(f"warm-up: {failure}")
 
     @property
     def ready(self) -> bool:
@@ -109,15 +110,6 @@ class OptimizerNode(Node):
             raise SettingsError("the optimizer is busy; change its parameters when it is idle")
         self.settings = settings
         self._planner = None
-
-    def _warm_up(self) -> None:
-        """Load what is compiled before the first request: place two robots for a short push."""
-        ahead = screw(np.zeros(3), np.array([0.1, 0.0, 0.0]), 0.05, 0.05, 0.2)
-        few = replace(self._weights, steps=5)
-        try:
-            robust_placement(self._item, ahead, 2, self._robot.footprint_radius, 1e3, few)
-        except NoPlacement as error:
-            self.get_logger().debug(f"warm-up: {error}")
 
     def _take_map(self, grid: Grid) -> None:
         """A plan under way on another map is dropped and begun anew."""

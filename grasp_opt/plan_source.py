@@ -6,7 +6,8 @@ from typing import Protocol
 from grasp_opt.group_job import Request
 from grasp_opt.placement import PlacementSettings
 from grasp_opt.sequencing import NoStep
-from grasp_opt.step_planner import GroupPlan, StepPlanner, StepSettings, TooFew
+from grasp_opt.step_planner import GroupPlan, StepPlanner, TooFew
+from grasp_opt.step_settings import StepSettings
 from push_job.method import Seen
 from push_model.belief import Belief
 from push_model.jobs import JobError

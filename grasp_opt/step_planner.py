@@ -20,71 +20,21 @@ from grasp_opt.placement import (
 )
 from grasp_opt.sequencing import LEAST_BACK, Move, NoStep, Sequencer, standoffs
 from grasp_opt.slices import Work, finish
+from grasp_opt.step_settings import StepSettings
 from push_model import se2
 from push_model.arrays import Array, Mask
 from push_model.free_space import FreeSpace, Obstacles
 from push_model.object_way import NoObjectWay, WayFinder, pieces
 from push_model.occupancy import OccupancyGrid
 from push_model.screws import point_velocities, screw_poses
-from push_model.settings import bounded, settings
 from push_model.specs import ObjectSpec, RobotSpec
 from push_model.traction import lift_share, push_force, standing_traction
 
 _MOST = 5  # robots that are placed at once
 _ROOMS = (1.0, 0.5, 0.1)  # of the room round the object, one after another
+_POSES = 20_000  # that a slice of the search for the object's way checks, 20 to 60 ms
 _LOOKED_AT = 0.04  # [m] between poses of a piece at which places are looked at
 _PARTS = (1.0, 0.75, 0.5, 0.35, 0.25, 0.15, 0.08)  # of a trajectory that no placement holds whole
-
-
-@settings
-class StepSettings:
-    """Room, speeds, and how sure a placement must be."""
-
-    room: float = bounded(
-        0.03,
-        low=0.0,
-        high=1.0,
-        doc="free space wanted around the object in addition to a robot diameter (m)",
-    )
-    clearance: float = bounded(
-        0.01, low=0.0, high=1.0, doc="least clearance of robots on their paths (m)"
-    )
-    gap: float = bounded(
-        0.015, low=0.0, high=1.0, doc="least gap between robots that push together (m)"
-    )
-    standoff: float = bounded(
-        0.012,
-        low=1e-3,
-        high=0.5,
-        doc="distance from the object at which robots wait before contact (m)",
-    )
-    back: float = bounded(
-        0.05, low=0.0, high=1.0, doc="straight last part of the path to a place at the object (m)"
-    )
-    speed: float = bounded(
-        0.05, low=1e-3, high=5.0, doc="greatest speed of any point of the object (m/s)"
-    )
-    acceleration: float = bounded(
-        0.05, low=1e-3, high=50.0, doc="greatest acceleration of any point of the object (m/s^2)"
-    )
-    force_share: float = bounded(
-        0.85, low=0.1, high=1.0, doc="fraction of its traction that a robot may use"
-    )
-    margin: float = bounded(
-        0.1,
-        low=0.0,
-        high=1.0,
-        doc="margin of the compatibility test that makes more robots unnecessary, a sine",
-    )
-    steps: int = bounded(
-        8, low=5, high=1000, doc="number N of time steps of (3.16) for a piece with one twist"
-    )
-    longest: float = bounded(
-        1.5,
-        low=0.05,
-        high=100.0,
-        doc="longest piece of the way before the next step is planned (m)",
-    )
 
 
 class TooFew(NoStep):
@@ -222,8 +172,11 @@ class StepPlanner:
         why: Exception = NoStep("there is no way for the object")
         for finder in self._finders:
             yield
+            search = finder.search(scene.pose, goal, among)
+            while not search.step(_POSES):
+                yield
             try:
-                way = pieces(finder.way(scene.pose, goal, among))
+                way = pieces(search.way)
             except NoObjectWay as error:
                 why = NoStep(str(error))
                 continue
@@ -366,12 +319,29 @@ class StepPlanner:
         return enough
 
     def _with_moves(self, scene: Scene, piece: _Piece, placement: Placement) -> Work[GroupPlan]:
-        """The plan of a push from known places: who goes to which of them, and how."""
-        s, pose, centres = self.settings, scene.pose, placement.contacts.centres(self._radius)
+        """The plan of a push from known places: who goes to which of them, and how.
+
+        Robots stop equally far before their places, so that they keep side by side when they come
+        to the object; those at slanting contacts need most. Where there is no room for that, each
+        stops as near as its contact allows.
+        """
+        centres, normals = placement.contacts.centres(self._radius), placement.contacts.normals
         ahead = point_velocities(piece.trajectory.first_twist, centres)
         ahead /= np.hypot(*ahead.T)[:, None]
-        normals = placement.contacts.normals
-        met = se2.transform(pose, centres - standoffs(normals, ahead, s.standoff) * ahead)
+        own = standoffs(normals, ahead, self.settings.standoff)
+        try:
+            away = np.full_like(own, own.max())
+            return (yield from self._moves(scene, piece, placement, ahead, away))
+        except NoStep:
+            return (yield from self._moves(scene, piece, placement, ahead, own))
+
+    def _moves(
+        self, scene: Scene, piece: _Piece, placement: Placement, ahead: Array, away: Array
+    ) -> Work[GroupPlan]:
+        """``_with_moves`` from so far ``(n, 1)`` [m] before the places, against directions ``(n,
+        2)`` ahead in the object's frame."""
+        s, pose, centres = self.settings, scene.pose, placement.contacts.centres(self._radius)
+        met = se2.transform(pose, centres - away * ahead)
         headings = pose[2] + np.arctan2(ahead[:, 1], ahead[:, 0])
         places = np.column_stack([met, headings])
         outline = se2.transform(pose, self._shape)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from grasp_opt.group_method import GROUP
 from grasp_opt.placement import PlacementSettings
-from grasp_opt.step_planner import StepSettings
+from grasp_opt.step_settings import StepSettings
 from push_estimation.pose_gate import PoseGateSettings
 from push_job.method import MethodSpec, method_names, method_spec
 from push_model.settings import SettingsError

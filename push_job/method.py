@@ -31,6 +31,10 @@ ENTRY_POINTS = "planar_push.methods"
 """The group of entry points by which installed packages name their methods."""
 
 
+Command = tuple[float, float] | tuple[float, float, float]
+"""Of one robot, see ``Told``."""
+
+
 @dataclass(frozen=True)
 class Task:
     """Bring the object to one target after another, or along a trajectory.
@@ -68,15 +72,13 @@ class Seen:
 class Told:
     """What a method says in a step.
 
-    commands: by robot; v [m/s] and omega [rad/s] of robots on wheels, vx and vy [m/s] in the fixed
-    frame of the others. A robot without one stands. planning: [s] CPU time that planning took in
-    this step; studies charge it. turns: [rad/s] by robot, of those that move in any direction; one
-    without does not turn.
+    commands: by robot; v [m/s] and omega [rad/s] of robots on wheels; vx, vy [m/s] in the fixed
+    frame and, where they are to turn, omega [rad/s] of the others. A robot without one stands.
+    planning: [s] CPU time that planning took in this step; studies charge it.
     """
 
-    commands: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    commands: Mapping[str, Command] = field(default_factory=dict)
     planning: float = 0.0
-    turns: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -32,11 +32,11 @@ class TeamCommander:
         """See Commander."""
         robots = [*self._roster.robots, *self._roster.released()]
         commands = [told.commands.get(name, (0.0, 0.0)) for name in robots]
-        first, second = [float(a) for a, _ in commands], [float(b) for _, b in commands]
+        first, second = [float(c[0]) for c in commands], [float(c[1]) for c in commands]
         if self._holonomic:
             message = Velocities(names=robots, vx=first, vy=second)
-            if told.turns:
-                message.omega = [float(told.turns.get(name, 0.0)) for name in robots]
+            if any(len(c) > 2 for c in commands):
+                message.omega = [float(sum(c[2:])) for c in commands]
             message.header.frame_id = FRAME
         else:
             message = Velocities(names=robots, vx=first, omega=second)

@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from rclpy.node import Node
 
-from push_job.method import Task
+from grasp_opt.group_control import GroupControlSettings
+from push_job.method import Task, method_spec
 from push_model import se2
 from push_model.arrays import Array
 from push_model.jobs import GoalRefused, JobError
@@ -66,7 +67,8 @@ class TeamTrace:
     """What was seen from ground truth.
 
     ways ``(t, 1 + n, 3)``: poses of object and robots, every ``TRACE`` seconds; phases: [s] of each
-    phase that the method reported; figures: values of its figures by name, at every report;
+    phase that the method reported; figures: values of its figures by name, at every report; forces
+    ``(n, 2)`` [N] of the robots on the object, mean of each tick that ends at force_times [s];
     collision_ticks: ticks in which robots touched each other, or anything a wall.
     """
 
@@ -74,6 +76,7 @@ class TeamTrace:
     ways: list[Array] = field(default_factory=list)
     phases: dict[str, float] = field(default_factory=dict)
     figures: dict[str, list[float]] = field(default_factory=dict)
+    force_times: list[float] = field(default_factory=list)
     forces: list[Array] = field(default_factory=list)
     collision_ticks: int = 0
     now: Array = field(default_factory=lambda: np.zeros((0, 3)))
@@ -165,14 +168,15 @@ class TeamObserver(Node):
     def _on_contacts(self, message: Contacts) -> None:
         if not self.recording:
             return
-        forces, hit = np.zeros(len(self._robots)), False
+        forces, hit = np.zeros((len(self._robots), 2)), False
         for k, (a, b) in enumerate(zip(message.body_a, message.body_b, strict=True)):
-            other = b if a == OBJECT else a
+            other, sign = (b, 1.0) if a == OBJECT else (a, -1.0)  # the force is on body a
             if OBJECT in (a, b) and other in self._robots:
-                size = math.hypot(message.force_x[k], message.force_y[k])
-                forces[self._robots.index(other)] += size
+                force = sign * np.array([message.force_x[k], message.force_y[k]])
+                forces[self._robots.index(other)] += force
             else:
                 hit = True
+        self.trace.force_times.append(time_from_ros(message.header.stamp))
         self.trace.forces.append(forces)
         self.trace.collision_ticks += hit
 
@@ -209,11 +213,22 @@ def run_team(
     """
     if world:
         believed = believed.settings("bridge", world=world)
-    believed, actual, drawn = doubt.draw(believed, seed)
+    believed, actual, drawn = doubt.draw(believed, seed, _delayed(system))
     if mistake is not None:
         believed = mistake(believed)
     with own_domain():
         return _run(system, believed, actual, task, limit, meanwhile, drawn)
+
+
+def _delayed(system: str) -> tuple[str, ...]:
+    """Methods whose settings say how old poses are."""
+    spec = method_spec(system)
+    control = None if spec is None else spec.sections.get("control")
+    return (
+        ("group",)
+        if control is not GroupControlSettings
+        else tuple(dict.fromkeys(("group", system)))
+    )
 
 
 def _run(

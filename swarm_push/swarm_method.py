@@ -6,7 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from push_job.method import Arena, Certificate, MethodSpec, Refusal, Seen, Task, Told, Unsuited
+from push_job.method import (
+    Arena,
+    Certificate,
+    Command,
+    MethodSpec,
+    Refusal,
+    Seen,
+    Task,
+    Told,
+    Unsuited,
+)
 from push_job.report import Drawable, Figure, Report, Status, discs, ellipses, polygon
 from push_model.arrays import Array
 from push_model.belief import Belief
@@ -127,8 +137,13 @@ class SwarmMethod:
         """See Method."""
         self._take_up(belief)
         pose = self._item.mass_pose(seen.object)
-        commands = self.job.step(seen.time, pose, seen.robots, seen.obstacles)
-        return Told(commands, turns=self.job.turns)
+        commands: dict[str, Command] = dict(
+            self.job.step(seen.time, pose, seen.robots, seen.obstacles)
+        )
+        for name, turn in self.job.turns.items():
+            vx, vy, *_ = commands.get(name, (0.0, 0.0))
+            commands[name] = (vx, vy, turn)
+        return Told(commands)
 
     def report(self, seen: Seen) -> Report | None:
         """See Method: density, cells and centroids, and how far it is to the target."""

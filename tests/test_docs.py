@@ -11,7 +11,7 @@ import pytest
 from grasp_opt.group_control import GroupControlSettings
 from grasp_opt.group_job import GroupJobSettings
 from grasp_opt.group_push import GroupPushSettings
-from grasp_opt.step_planner import StepSettings
+from grasp_opt.step_settings import StepSettings
 from push_model.jobs import JobError
 from push_mpc.settings import ControllerSettings, MpcSettings, TrackerSettings
 from push_mpc.task import TrackError

@@ -13,26 +13,24 @@ from typing import Any
 
 import numpy as np
 
-from grasp_opt.group_job import GroupJob
-from grasp_opt.object_trajectory import study_trajectories
-from grasp_opt.selection import GraspSelector, NoGraspFound, Selection
-from grasp_opt.sequencing import NoStep
-from grasp_opt.step_planner import GroupPlan, StepPlanner
+from grasp_opt.object_trajectory import ObjectTrajectory, study_trajectories
 from push_model import se2
 from push_model.arrays import Array
 from push_model.free_space import FreeSpace
-from push_model.jobs import JobError, JobPhase
+from push_model.jobs import JobError
 from push_model.occupancy import rasterise
 from push_model.settings import SettingsError
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
 from push_scenario.bodies import load_object, load_robot
-from push_study.group_world import TICK, GroupWorld
+from push_study import given_grasp, synchronised
+from push_study.given_grasp import task_along
 from push_study.pool import Row
+from push_study.push_record import PushRecord
 from push_study.rooms import scattered
 from push_study.statistics import sign_test
 from push_study.study import StudyOptions
 from push_study.summary import by_cell
-from push_study.synchronised import SynchronisedTrackers
+from push_study.team_run import made_scenario, run_team
 from push_study.uncertainty import uncertainty
 
 SCENARIOS = ("plate_square", "plate_triangle", "plate_hexagon", "plate_ellipse")
@@ -47,7 +45,9 @@ _GAP = 0.015  # [m] between robots
 _ROOM = 2.2  # [m] about the trajectory
 _LIMIT = 400.0  # [s]
 _GOAL = 0.02, 0.1  # [m], [rad] at the end that count as success
-_SETTLE = 1.0  # [s] after the end of a trajectory, until robots stand
+_MEASURES = ("position_error_m", "force_n", "charged_s", "planning_cpu_s")
+METHODS = {"mpc": synchronised.NAME, "group": given_grasp.NAME}
+"""That run in the graph, by law."""
 
 
 @dataclass(frozen=True)
@@ -88,133 +88,74 @@ def tasks(options: StudyOptions) -> list[SelectionTask]:
     ]
 
 
-def choose(task: SelectionTask) -> Selection:
-    """The grasp of a task; raises NoGraspFound."""
-    item, robot = load_object(task.scenario), load_robot(ROBOT)
-    path = study_trajectories(SPEED, ACCELERATION)[task.trajectory]
+def settings_of(task: SelectionTask) -> dict[str, Any]:
+    """How the grasp of a task is chosen, as a scenario has it."""
     seed = zlib.crc32(f"{task.seed} {task.scenario} {task.trajectory}".encode())
-    radius = robot.footprint_radius
-    selector = GraspSelector(item, path, ROBOTS, radius, least_margin=_MARGIN, gap=_GAP)
-    if task.grasp == "selected":
-        return selector.select(_TRIES, seed)
-    return selector.first(_TRIES, seed)
+    drawn = {"tries": _TRIES, "seed": seed, "margin": _MARGIN, "gap": _GAP}
+    return {"choice": task.grasp, **drawn}
 
 
 def trial(task: SelectionTask) -> Row:
-    """Go to the places and push."""
+    """Choose the grasp, go to the places and push."""
     item, robot = load_object(task.scenario), load_robot(ROBOT)
     path = study_trajectories(SPEED, ACCELERATION)[task.trajectory]
-    row: Row = {
+    method = METHODS[task.law]
+    settings = {method: {"grasp": settings_of(task)}}
+    places, start = _spots(task, item, robot, path), item.geometric_pose(path.pose[0])
+    room = _room(path)
+    scenario = made_scenario(task.scenario, room, robot, places, item, start, settings)
+    record = PushRecord(item, path)
+    outcome = run_team(
+        method,
+        scenario,
+        task_along(path, item),
+        uncertainty(task.uncertainty),
+        task.seed,
+        _LIMIT,
+        record,
+        task.world,
+    )
+    away, turned = outcome.error
+    reason = "" if outcome.code in (JobError.NONE, JobError.OFF_TARGET) else outcome.reason
+    if not reason and (away > _GOAL[0] or turned > _GOAL[1]):
+        reason = f"{1e3 * away:.0f} mm and {turned:.2f} rad off at the end"
+    row = outcome.row()
+    row["final_position_error_m"] = row.pop("position_error_m")
+    row["final_orientation_error_rad"] = row.pop("orientation_error_rad")
+    row = {
         "scenario": task.scenario,
         "seed": task.seed,
         "trajectory": task.trajectory,
         "grasp": task.grasp,
         "law": task.law,
-    }
-    try:
-        chosen = choose(task)
-    except NoGraspFound as error:
-        return row | {"success": False, "reason": str(error)}
-    reach = np.abs(path.pose[:, :2]).max(axis=0) * 2.0 + _ROOM
-    room = EnvironmentSpec((float(reach[0]), float(reach[1])), resolution=0.02)
-    grid, start = rasterise(room), path.pose[0]
-    outline = se2.transform(start, item.geometry.outline)
-    random = np.random.default_rng(task.seed)
-    radius = robot.footprint_radius
-    spots = scattered(random, ROBOTS, FreeSpace(grid), outline, radius, gap=0.03)
-    planner, job = StepPlanner(grid, item, robot), GroupJob(item, robot, ROBOTS)
-    doubt, begin = uncertainty(task.uncertainty), item.geometric_pose(start)
-    with GroupWorld(room, robot, spots, item, begin, doubt, task.seed, task.world) as world:
-        record = _Record(item, world)
-        job.begin_along(path)
-        while world.time < _LIMIT and job.busy:
-            if task.law == "mpc" and job.state is JobPhase.PUSHING:
-                reason = _follow(world, record, item, robot, job.plan)
-                break
-            seen, robots = world.see()
-            twists = job.step(world.time, item.mass_pose(seen), robots)
-            if job.request is not None:
-                try:
-                    job.planned(planner.taking(chosen.way, path, job.request.pose, robots))
-                except NoStep as error:
-                    job.failed(JobError.PLANNING_FAILED, str(error))
-            pushing = job.state is JobPhase.PUSHING and job.last is not None
-            record.step(twists, path.sample(job.last.time) if pushing and job.last else None)
-        else:
-            ended = job.error in (JobError.NONE, JobError.OFF_TARGET) and not job.busy
-            reason = "" if ended else job.reason
-        off = se2.between(path.pose[-1], item.mass_pose(world.truth()[0]))
-        drawn = world.drawn
-    away, turned = float(np.hypot(off[0], off[1])), abs(float(off[2]))
-    if not reason and (away > _GOAL[0] or turned > _GOAL[1]):
-        reason = f"{1e3 * away:.0f} mm and {turned:.2f} rad off at the end"
-    row |= {
-        "final_position_error_m": away,
-        "final_orientation_error_rad": turned,
         "success": not reason,
+        **row,
         "reason": reason,
-        "margin": chosen.margin,
-        "mhd": chosen.value,
-        "passed": chosen.passed,
     }
-    return row | record.figures() | drawn
+    grasp = None if record.method is None else record.method.plans.grasp
+    if grasp is not None and grasp.selection is not None:
+        chosen = grasp.selection
+        row |= {"margin": chosen.margin, "mhd": chosen.value, "passed": chosen.passed}
+    return row | record.figures(outcome.trace)
 
 
-class _Record:
-    """What an object and the robots do while they push."""
-
-    def __init__(self, item: ObjectSpec, world: GroupWorld) -> None:
-        self._item, self._world = item, world
-        self._errors: list[float] = []
-        self._turned: list[float] = []
-        self._forces: list[Array] = []
-        self._collisions = 0
-
-    def step(self, twists: Array, wanted: Array | None) -> None:
-        """Go on by a tick; wanted ``(3,)``: where the object is to be, None before the push."""
-        if wanted is not None:
-            off = se2.between(wanted, self._item.mass_pose(self._world.truth()[0]))
-            self._errors.append(float(np.hypot(off[0], off[1])))
-            self._turned.append(abs(float(off[2])))
-        self._world.step(twists)
-        felt, touched = self._world.felt()
-        self._collisions += touched
-        if wanted is not None:
-            self._forces.append(felt)
-
-    def figures(self) -> Row:
-        """Means of the push."""
-        row: Row = {"collision_ticks": self._collisions}
-        if self._errors:
-            row |= {
-                "position_error_m": float(np.mean(self._errors)),
-                "worst_position_error_m": float(np.max(self._errors)),
-                "orientation_error_rad": float(np.mean(self._turned)),
-                "force_n": float(np.mean(self._forces)),
-            }
-        return row
+def _room(path: ObjectTrajectory) -> EnvironmentSpec:
+    reach = np.abs(path.pose[:, :2]).max(axis=0) * 2.0 + _ROOM
+    return EnvironmentSpec((float(reach[0]), float(reach[1])), resolution=0.02)
 
 
-def _follow(
-    world: GroupWorld, record: _Record, item: ObjectSpec, robot: RobotSpec, plan: GroupPlan | None
-) -> str:
-    """Every robot of a plan along its own way; why that failed, or nothing."""
-    assert plan is not None
-    pushers, begin = list(plan.pushers), world.time
-    trackers = SynchronisedTrackers(item, robot, plan.placement.way, plan.trajectory)
-    while (now := world.time - begin) < plan.trajectory.duration + _SETTLE:
-        _, robots = world.see()
-        twists = np.zeros((len(robots), 2))
-        twists[pushers] = trackers.step(now, TICK, robots[pushers])
-        if trackers.lost:
-            return "a robot cannot follow its way"
-        record.step(twists, plan.trajectory.sample(now))
-    return ""
+def _spots(
+    task: SelectionTask, item: ObjectSpec, robot: RobotSpec, path: ObjectTrajectory
+) -> Array:
+    """``(n, 3)`` random poses of the robots."""
+    space, random = FreeSpace(rasterise(_room(path))), np.random.default_rng(task.seed)
+    outline = se2.transform(path.pose[0], item.geometry.outline)
+    return scattered(random, ROBOTS, space, outline, robot.footprint_radius, gap=0.03)
 
 
 def statistics(rows: list[Row]) -> dict[str, Any]:
     """Means by grasp and law, and the sign tests of the pairs."""
-    result: dict[str, Any] = dict(by_cell(rows, ("grasp", "law"), ("position_error_m", "force_n")))
+    result: dict[str, Any] = dict(by_cell(rows, ("grasp", "law"), _MEASURES))
     for law in LAWS:
         pairs = _pairs([r for r in rows if r.get("law") == law], "grasp")
         lower = sum(p["selected"] < p["random"] for p in pairs)

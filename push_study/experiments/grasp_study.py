@@ -137,6 +137,9 @@ def trial(task: GraspTask) -> Row:
         "position_error_m": done.position,
         "orientation_error_rad": done.orientation,
         "length_m": trajectory.length,
+        "duration_s": done.outcome.seconds,
+        "planning_cpu_s": done.outcome.planning,
+        "charged_s": done.outcome.charged,
         **predictors(item, contacts, trajectory),
     }
     return row | ({"energy_n": done.energy} if np.isfinite(done.energy) else {})

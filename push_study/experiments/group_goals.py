@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from grasp_opt.group_job import GroupJob
-from grasp_opt.step_planner import StepSettings
+from grasp_opt.step_settings import StepSettings
 from push_job.method import Task
 from push_model import se2
 from push_model.arrays import Array

@@ -18,31 +18,35 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from grasp_opt.group_push import GroupPush, Phase
+from grasp_opt.contact_outline import ContactOutline
+from grasp_opt.group_push import GroupPush
 from grasp_opt.object_trajectory import ObjectTrajectory, polynomial, sinusoid
-from grasp_opt.placement import Placement, Placer, robust_placement
-from push_model import se2
 from push_model.arrays import Array
+from push_model.jobs import JobError
 from push_model.settings import SettingsError
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
-from push_model.traction import lift_share, standing_traction
 from push_scenario.bodies import load_object, load_robot
-from push_study.group_world import GroupWorld
+from push_study import given_grasp
+from push_study.given_grasp import task_along
 from push_study.pool import Row
+from push_study.push_record import PushRecord
 from push_study.statistics import sign_test
 from push_study.study import StudyOptions
+from push_study.summary import by_cell
+from push_study.team_run import TeamTrace, made_scenario, run_team
 from push_study.uncertainty import uncertainty
 
 SCENARIOS = ("bend", "double-bend", "wave")
 """Trajectories, where none are named."""
 OPTIONS = {"uncertainty": "mild", "world": "pybullet"}
-ROBOTS = (2, 3)
+ROBOTS, PLACEMENTS = (2, 3), ("optimised", "even")
 ROBOT, OBJECT = "epuck_ring", "plate_ellipse"
 SPEED, ACCELERATION = 0.05, 0.05  # [m/s], [m/s^2]
 _BACK = -0.5 * math.pi  # [rad] the object's y axis points ahead, as in the thesis
-_APART = 0.01  # [m] between robots and object at the beginning
+_APART = 0.1  # [m] that robots have to go to the object from where they set out
+_FORCE_SHARE = 0.9  # of its traction that a robot of an optimised placement may use
 _MARGIN = 0.8  # [m] about the trajectory
-_LONGER = 20.0  # [s] that a push may take beyond its trajectory
+_LONGER = 200.0  # [s] that going to the places and the push may take beyond the trajectory
 _SMOOTH = 25  # ticks over which forces are averaged in plots
 _LABELS = ("y [m]", "position error [mm]", "contact force [N]")
 THETA0 = {
@@ -93,60 +97,78 @@ def tasks(options: StudyOptions) -> list[TrackingTask]:
         for name in options.scenarios
         for count in ROBOTS
         for k in range(options.trials)
-        for placement in ("optimised", "even")
+        for placement in PLACEMENTS
     ]
 
 
-def placement_of(task: TrackingTask, item: ObjectSpec, robot: RobotSpec) -> Placement:
-    """Where the robots of a task push."""
-    path, radius = trajectories()[task.scenario], robot.footprint_radius
+def settings_of(task: TrackingTask) -> dict[str, Any]:
+    """The settings of the grasp of a task, as a scenario has them."""
     if task.placement == "optimised":
-        most = 0.9 * standing_traction(robot, lift_share(robot, item))
-        return robust_placement(item, path, task.robots, radius, most)
-    placer = Placer(item, path, task.robots, radius)
-    return placer.placement(placer.outline.way_of_angle(np.array(THETA0[task.robots])))
+        return {"choice": "optimised", "force_share": _FORCE_SHARE}
+    outline = ContactOutline(load_object(OBJECT).geometry)
+    ways = outline.way_of_angle(np.array(THETA0[task.robots]))
+    return {"choice": "given", "ways": ways.tolist()}
+
+
+def starts(item: ObjectSpec, robot: RobotSpec, path: ObjectTrajectory, count: int) -> Array:
+    """``(n, 3)`` poses behind the object from which robots set out, whatever places they take."""
+    outline = ContactOutline(item.geometry)
+    ways = outline.way_of_angle(np.array(THETA0[count]))
+    return GroupPush(item, robot, ways, path).starts(path.pose[0], _APART)
 
 
 def trial(task: TrackingTask) -> Row:
-    """Push once."""
+    """Choose the places, go to them and push."""
     item, robot = load_object(OBJECT), load_robot(ROBOT)
-    path, doubt = trajectories()[task.scenario], uncertainty(task.uncertainty)
-    placed = placement_of(task, item, robot)
-    push = GroupPush(item, robot, placed.way, path)
-    start = path.pose[0]
-    starts = push.starts(start, _APART)
+    path = trajectories()[task.scenario]
     reach = 2.0 * (np.abs(path.pose[:, :2]).max(axis=0) + _MARGIN)
     room = EnvironmentSpec((float(reach[0]), float(reach[1])), resolution=0.05)
-    begin = item.geometric_pose(start)
-    times, objects, wanted, forces, lacking = [], [], [], [], []
-    reason, collision = "", False
-    with GroupWorld(room, robot, starts, item, begin, doubt, task.seed, task.world) as world:
-        while world.time < path.duration + _LONGER:
-            seen, robots = world.see()
-            step = push.step(world.time, item.mass_pose(seen), robots)
-            if step.phase is Phase.PUSH and step.command is not None:
-                times.append(step.time)
-                objects.append(item.mass_pose(world.truth()[0]))
-                wanted.append(path.sample(step.time))
-                lacking.append(step.command.lacking)
-            world.step(step.twists)
-            felt, touched = world.felt()
-            collision = collision or touched
-            if step.phase is Phase.PUSH:
-                forces.append(felt)
-            if step.phase in (Phase.DONE, Phase.FAILED):
-                reason = step.reason
-                break
-        taken, drawn = world.time, world.drawn
-    trace = {"time": times, "object": objects, "wanted": wanted, "force": forces}
-    _trace_file(task).parent.mkdir(parents=True, exist_ok=True)
-    arrays: dict[str, Any] = {k: np.array(v) for k, v in trace.items()}
-    np.savez_compressed(_trace_file(task), **arrays)
-    return (
-        _row(task, placed, reason, taken, collision)
-        | drawn
-        | _figures(np.array(objects), np.array(wanted), np.array(forces), np.array(lacking))
+    places, start = starts(item, robot, path, task.robots), item.geometric_pose(path.pose[0])
+    settings = {given_grasp.NAME: {"grasp": settings_of(task)}}
+    scenario = made_scenario(task.scenario, room, robot, places, item, start, settings)
+    record = PushRecord(item, path)
+    outcome = run_team(
+        given_grasp.NAME,
+        scenario,
+        task_along(path, item),
+        uncertainty(task.uncertainty),
+        task.seed,
+        path.duration + _LONGER,
+        record,
+        task.world,
     )
+    row = outcome.row()
+    done = outcome.code in (JobError.NONE, JobError.OFF_TARGET)
+    row["final_position_error_m"] = row.pop("position_error_m")
+    row["final_orientation_error_rad"] = row.pop("orientation_error_rad")
+    row = {
+        "scenario": task.scenario,
+        "seed": task.seed,
+        "robots": task.robots,
+        "placement": task.placement,
+        "success": done,
+        **row,
+        "reason": "" if done else outcome.reason,
+    }
+    plan = None if record.method is None else record.method.job.plan
+    if plan is not None:
+        row["margin"] = plan.placement.margin
+        row["planned_force_n"] = float(np.linalg.norm(plan.placement.forces, axis=2).mean())
+    if record.times:
+        _keep(task, record, outcome.trace)
+    return row | record.figures(outcome.trace)
+
+
+def _keep(task: TrackingTask, record: PushRecord, trace: TeamTrace) -> None:
+    """Write what is plotted."""
+    arrays: dict[str, Any] = {
+        "time": np.array(record.times),
+        "object": np.array(record.objects),
+        "wanted": np.array(record.wanted),
+        "force": record.forces(trace),
+    }
+    _trace_file(task).parent.mkdir(parents=True, exist_ok=True)
+    np.savez_compressed(_trace_file(task), **arrays)
 
 
 def _trace_file(task: TrackingTask) -> Path:
@@ -154,81 +176,73 @@ def _trace_file(task: TrackingTask) -> Path:
     return Path(task.out) / "pushes" / name
 
 
-def _row(task: TrackingTask, placed: Placement, reason: str, taken: float, collision: bool) -> Row:
-    return {
-        "scenario": task.scenario,
-        "seed": task.seed,
-        "robots": task.robots,
-        "placement": task.placement,
-        "success": not reason,
-        "reason": reason,
-        "collision": collision,
-        "duration_s": taken,
-        "margin": placed.margin,
-        "planned_force_n": float(np.linalg.norm(placed.forces, axis=2).mean()),
-    }
+def statistics(rows: list[Row]) -> dict[str, Any]:
+    """Means by trajectory, number of robots and placement; the sign tests of the pairs."""
+    result: dict[str, Any] = dict(
+        by_cell(
+            rows,
+            ("scenario", "robots", "placement"),
+            ("position_error_m", "force_n", "force_spread_n", "charged_s"),
+        )
+    )
+    for name in dict.fromkeys(r["scenario"] for r in rows):
+        for count in ROBOTS:
+            lower, pairs = _nearer(rows, name, count)
+            if pairs:
+                result[f"pairs_{name}_{count}"] = pairs
+                result[f"optimised_nearer_{name}_{count}"] = lower
+                result[f"sign_p_{name}_{count}"] = sign_test(lower, pairs)
+    return result
 
 
-def _figures(objects: Array, wanted: Array, forces: Array, lacking: Array) -> Row:
-    """Errors and forces; force_spread_n: standard deviation between robots, at each moment."""
-    if not len(objects):
-        return {}
-    off = objects - wanted
-    away = np.hypot(*off[:, :2].T)
-    turned = np.abs([se2.wrap(float(a)) for a in off[:, 2]])
-    return {
-        "position_error_m": float(away.mean()),
-        "worst_position_error_m": float(away.max()),
-        "orientation_error_rad": float(turned.mean()),
-        "worst_orientation_error_rad": float(turned.max()),
-        "force_n": float(forces.mean()),
-        "force_spread_n": float(forces.std(axis=1).mean()),
-        "greatest_force_n": float(forces.max(axis=1).mean()),
-        "lacking": float(lacking.mean()),
-    }
+def _mine(rows: list[Row], name: str, count: int, placement: str) -> list[Row]:
+    key = name, count, placement
+    return [r for r in rows if (r["scenario"], r.get("robots"), r.get("placement")) == key]
+
+
+def _nearer(rows: list[Row], name: str, count: int) -> tuple[int, int]:
+    """In how many trials the optimised placement is nearer, of how many that both completed."""
+    best, even = (
+        {r["seed"]: r["position_error_m"] for r in _mine(rows, name, count, p) if r["success"]}
+        for p in PLACEMENTS
+    )
+    seeds = set(best) & set(even)
+    return sum(best[s] < even[s] for s in seeds), len(seeds)
 
 
 def conclude(options: StudyOptions, tasks: Sequence[TrackingTask], rows: list[Row]) -> None:
     """Optimised beside even placements, task by task."""
     print(
         "\ntrajectory   robots  placement  margin  pushed     position [mm]   orientation [rad]"
-        "   force [N]  spread [N]"
+        "   force [N]  spread [N]  time [s]  planning [s]"
     )
     for name in options.scenarios:
         for count in ROBOTS:
-            both = []
-            for placement in ("optimised", "even"):
-                mine = [
-                    r
-                    for r in rows
-                    if (r["scenario"], r.get("robots"), r.get("placement"))
-                    == (name, count, placement)
-                ]
-                good = [r for r in mine if r["success"]]
-                if not mine:
-                    continue
-                print(_line(name, count, placement, mine, good))
-                both.append({r["seed"]: r["position_error_m"] for r in good})
-            if len(both) == 2:
-                seeds = sorted(set(both[0]) & set(both[1]))
-                lower = sum(both[0][s] < both[1][s] for s in seeds)
+            for placement in PLACEMENTS:
+                mine = _mine(rows, name, count, placement)
+                if mine:
+                    print(_line(name, count, placement, mine))
+            lower, pairs = _nearer(rows, name, count)
+            if pairs:
                 print(
-                    f"{'':13s}the optimised one is nearer in {lower} of {len(seeds)} trials, "
-                    f"p = {sign_test(lower, len(seeds)):.3f}"
+                    f"{'':13s}the optimised one is nearer in {lower} of {pairs} trials, "
+                    f"p = {sign_test(lower, pairs):.3f}"
                 )
     _plots(tasks, options)
 
 
-def _line(name: str, count: int, placement: str, mine: list[Row], good: list[Row]) -> str:
+def _line(name: str, count: int, placement: str, mine: list[Row]) -> str:
+    good = [r for r in mine if r["success"]]
+
     def mean(column: str) -> float:
         return float(np.mean([r[column] for r in good])) if good else float("nan")
 
     worst = max((r["position_error_m"] for r in good), default=float("nan"))
     return (
-        f"{name:13s}{count:5d}   {placement:10s} {mine[0]['margin']:6.3f}  {len(good):3d} of "
+        f"{name:13s}{count:5d}   {placement:10s} {mean('margin'):6.3f}  {len(good):3d} of "
         f"{len(mine):<3d} {1e3 * mean('position_error_m'):6.2f} (<= {1e3 * worst:5.2f}) "
         f"{mean('orientation_error_rad'):12.4f}   {mean('force_n'):12.2f} "
-        f"{mean('force_spread_n'):10.2f}"
+        f"{mean('force_spread_n'):10.2f} {mean('charged_s'):9.1f} {mean('planning_cpu_s'):9.2f}"
     )
 
 

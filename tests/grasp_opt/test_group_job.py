@@ -11,9 +11,9 @@ from push_model.specs import EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
 from push_study.experiments import group_goals
 from push_study.experiments.group_goals import GoalTask
-from push_study.group_world import GroupWorld, answer
 from push_study.study import StudyOptions, run_study
 from push_study.uncertainty import uncertainty
+from tests.driving import GroupWorld, answer
 
 ITEM, ROBOT = load_object("plate_ellipse"), load_robot("epuck_ring")
 ROOM = EnvironmentSpec((4.0, 3.0), resolution=0.02)

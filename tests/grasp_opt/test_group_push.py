@@ -12,8 +12,8 @@ from grasp_opt.group_push import ActuationMonitor, GroupPush, GroupPushSettings,
 from grasp_opt.object_trajectory import polynomial
 from push_model.specs import EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
-from push_study.group_world import TICK, GroupWorld
 from push_study.uncertainty import uncertainty
+from tests.driving import TICK, GroupWorld
 
 ITEM, ROBOT = load_object("plate_ellipse"), load_robot("epuck_ring")
 ROOM = EnvironmentSpec((6.0, 6.0), resolution=0.05)

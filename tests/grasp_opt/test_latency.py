@@ -20,8 +20,8 @@ from push_model.occupancy import rasterise
 from push_model.specs import EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
 from push_study.experiments.group_goals import GoalTask, problem
-from push_study.group_world import TICK, GroupWorld, answer
 from push_study.uncertainty import uncertainty
+from tests.driving import TICK, GroupWorld, answer
 
 ROBOT = load_robot("epuck_ring")
 ROOM = EnvironmentSpec((6.0, 6.0), resolution=0.05)

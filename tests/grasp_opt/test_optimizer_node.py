@@ -11,12 +11,15 @@ from rclpy.action import ActionClient
 from grasp_opt.optimizer_node import OptimizerNode
 from grasp_opt.sequencing import NoStep
 from grasp_opt.step_planner import Scene, StepPlanner
+from push_model import object_way
 from push_model.occupancy import rasterise
+from push_model.settings import from_mapping
+from push_model.specs import EnvironmentSpec
 from push_msgs.action import PlanGroupPush
 from push_ros.conversions import grid_to_ros, pose_stamped_to_ros, pose_to_ros
 from push_ros.process import Spinner
 from push_ros.qos import LATCHED
-from push_scenario.bodies import load_robot
+from push_scenario.bodies import load_object, load_robot
 from push_scenario.scenario import scenario_from_mapping
 from push_study.experiments.group_goals import GoalTask, problem
 
@@ -36,7 +39,11 @@ def slices(seed, count):
     """CPU time [s] of every slice of a hard plan: a triangle among obstacles."""
     p = problem(GoalTask("obstacles", seed, "", count, 3, "planar", "mild"))
     planner = StepPlanner(rasterise(p.environment), p.item, load_robot("epuck_ring"))
-    work = planner.planning(Scene(p.start, p.robots, (), np.zeros((0, 3))), p.goal)
+    return times_of(planner.planning(Scene(p.start, p.robots, (), np.zeros((0, 3))), p.goal))
+
+
+def times_of(work):
+    """CPU time [s] of every slice, until there is a plan or none is found."""
     times = []
     while True:
         began = time.thread_time()
@@ -61,6 +68,20 @@ def test_no_slice_of_the_hardest_plans_is_long(seed, count):
     slices(1, 3)
     times = slices(seed, count)
     assert len(times) > 50 and max(times) < LONGEST
+
+
+def test_a_long_search_for_the_objects_way_is_cut_into_slices():
+    """Through the gap in the wall a disc fits that lies in the triangle, but not the triangle: the
+    search looks at all that can be reached before it gives up."""
+    walls = [{"centre": [1.0, s * 2.1], "size": [0.1, 3.8]} for s in (-1, 1)]
+    values = {"size": [12.0, 8.0], "resolution": 0.02, "boxes": walls}
+    grid = rasterise(from_mapping(EnvironmentSpec, values, "room"))
+    start, goal = np.array([-5.4, 0.0, 0.0]), np.array([5.0, 0.0, 2.0])
+    planner = StepPlanner(grid, load_object("plate_triangle"), load_robot("epuck_ring"))
+    robots = np.array([[-5.0, y, 0.0] for y in (-1.0, 1.0)])
+    object_way.warm_up()
+    times = times_of(planner.planning(Scene(start, robots, (), np.zeros((0, 3))), goal))
+    assert len(times) > 8 and max(times) < LONGEST
 
 
 class Client:

@@ -16,9 +16,9 @@ from push_model.settings import from_mapping
 from push_model.specs import EnvironmentSpec, ObjectSpec
 from push_scenario.bodies import load_object, load_robot
 from push_study.experiments.group_goals import plate
-from push_study.group_world import GroupWorld, answer
 from push_study.rooms import scattered
 from push_study.uncertainty import uncertainty
+from tests.driving import GroupWorld, answer
 
 ROBOT = load_robot("epuck_ring")
 SIZE = (3.0, 3.0)

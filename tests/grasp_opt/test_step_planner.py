@@ -9,7 +9,8 @@ from grasp_opt.moves import Mover, MoveSettings, back_off
 from grasp_opt.object_trajectory import screw
 from grasp_opt.sequencing import NoStep, Sequencer
 from grasp_opt.slices import finish
-from grasp_opt.step_planner import StepPlanner, StepSettings, TooFew
+from grasp_opt.step_planner import StepPlanner, TooFew
+from grasp_opt.step_settings import StepSettings
 from push_model import se2
 from push_model.free_space import FreeSpace, Obstacles
 from push_model.occupancy import OccupancyGrid, rasterise
@@ -152,3 +153,18 @@ def test_who_stands_in_the_way_and_cannot_leave_is_not_run_over():
         else:
             with pytest.raises(NoStep, match="stands in the way and cannot leave"):
                 finish(sequencer.clear((), moved, np.array([[1.0, 1.0]])))
+
+
+def test_robots_stop_side_by_side_before_they_come_to_the_object():
+    """As far apart as at their places, less a tenth, whatever their contacts slant: from there they
+    go on together, and one that stood nearer would be run into from behind."""
+    gap = StepSettings().gap
+    for seed in range(18):
+        p = problem(GoalTask("open", seed, "", 3 + seed % 3, (0, *range(3, 9))[seed % 7], "", ""))
+        planner = StepPlanner(rasterise(p.environment), p.item, load_robot("epuck_ring"))
+        plan = planner.plan(p.start, p.goal, p.robots, (), np.zeros((0, 3)), 3)
+        stops = {move.robot: move.points[-1] for batch in plan.batches for move in batch}
+        there = np.array([stops[robot] for robot in plan.pushers])
+        away = np.hypot(*(there[:, None] - there).transpose(2, 0, 1))
+        radius = load_robot("epuck_ring").footprint_radius
+        assert away[np.triu_indices(len(there), 1)].min() > 2.0 * radius + 0.9 * gap, seed

@@ -10,7 +10,6 @@ from push_model.occupancy import rasterise
 from push_model.screws import screw_poses
 from push_model.specs import BoxSpec, EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
-from push_study.group_world import GroupWorld
 from push_study.uncertainty import uncertainty
 from swarm_push.crescent_law import CrescentLawSettings
 from swarm_push.escape import Escape
@@ -19,7 +18,7 @@ from swarm_push.region import covered_region
 from swarm_push.rim import Rim
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
 from swarm_push.walls import Walls
-from tests.driving import drive
+from tests.driving import GroupWorld, drive
 
 R = 0.05
 

@@ -10,7 +10,6 @@ from push_model.jobs import JobError
 from push_model.occupancy import rasterise
 from push_model.specs import EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
-from push_study.group_world import GroupWorld
 from push_study.uncertainty import uncertainty
 from swarm_push.contacts import Contacts, find_contacts
 from swarm_push.crescent_law import CrescentLaw
@@ -19,7 +18,7 @@ from swarm_push.liveness import LivenessCheck, LivenessSettings
 from swarm_push.region import covered_region
 from swarm_push.rim import Rim
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
-from tests.driving import drive
+from tests.driving import GroupWorld, drive
 
 NAMES = ("a", "b", "c")
 DT = 0.02

@@ -13,7 +13,6 @@ from push_model.specs import EnvironmentSpec
 from push_msgs.action import SwarmMove
 from push_ros.validation import InvalidMessage
 from push_scenario.bodies import load_object, load_robot
-from push_study.group_world import GroupWorld
 from push_study.rooms import around as starts
 from push_study.uncertainty import uncertainty
 from swarm_push.crescent_law import CrescentLawSettings
@@ -21,7 +20,7 @@ from swarm_push.laws import LawSections, LawSettings
 from swarm_push.node import targets_from_ros
 from swarm_push.region import covered_region, is_open
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
-from tests.driving import drive
+from tests.driving import GroupWorld, drive
 
 ROBOT = load_robot("epuck_ring")
 NONE = np.zeros((0, 3))

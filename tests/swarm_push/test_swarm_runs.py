@@ -15,11 +15,11 @@ from push_model.occupancy import rasterise
 from push_model.shape_specs import PolygonShape
 from push_model.specs import EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
-from push_study.group_world import GroupWorld
 from push_study.rooms import around as starts
 from push_study.uncertainty import uncertainty
 from swarm_push.region import covered_region
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
+from tests.driving import GroupWorld
 
 HALF = 2.0
 NONE = np.zeros((0, 3))

@@ -113,7 +113,7 @@ def test_what_a_node_hears_tells_serves_and_asks(graph, node):
 def test_settings_and_their_defaults_exist():
     from grasp_opt.group_control import GroupControlSettings
     from grasp_opt.group_job import GroupJobSettings
-    from grasp_opt.step_planner import StepSettings
+    from grasp_opt.step_settings import StepSettings
     from push_mpc.settings import ControllerSettings, MpcSettings, TrackerSettings
     from push_planner import PlannerSettings
     from push_supervisor import SupervisorSettings
