@@ -59,8 +59,8 @@ def imported(path):
 
 def is_shell(path):
     """Whether a file may know ROS: the node of a package, and how it talks to other nodes."""
-    names = ("node.py", "torque_node.py", "optimizer_node.py", "agent_node.py")
-    return path.name in (*names, "parameters.py", "peers.py") or path.name.endswith("_messages.py")
+    others = ("node.py", "parameters.py", "peers.py")
+    return path.name in others or path.name.endswith(("_node.py", "_messages.py"))
 
 
 FILES = sources()
