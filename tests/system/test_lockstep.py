@@ -30,7 +30,7 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 
 NODE_MODULES = (
     "push_ros.pace_feed",
-    "push_mpc.node",
+    "push_mpc.follower_node",
     "sim_bridge.node",
     "sim_bridge.command_intake",
 )
