@@ -6,7 +6,7 @@ robot of this kind holds its wheels when it is told a velocity.
 
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -60,7 +60,7 @@ class TorqueFollower:
             declared(FrictionTrustSettings, "friction"),
         )
         self.gate: PoseGateSettings = declared(PoseGateSettings, "poses")
-        self.bodies = {self._robot}
+        self.bodies: Collection[str] = {self._robot}
         self.wheels = WheelFeed()
         names, diagnostics = shell.names, shell.diagnostics
         topics = [names.robot(self._robot, t) for t in ("wheel_torques", "cmd_vel", "joint_states")]
