@@ -5,10 +5,9 @@ It pushes, keeps off other bodies, uses what is believed of robot and object, an
 
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
-import numpy as np
 from geometry_msgs.msg import TwistStamped
 
 from push_estimation.pose_gate import PoseGateSettings
@@ -19,6 +18,7 @@ from push_mpc import Push, Task, Tick, TrackerSettings, TrajectoryTracker, contr
 from push_mpc.believed_push import Unstable, believed_push
 from push_mpc.follower_node import Command, Followed, FollowerKind, FollowerNode
 from push_mpc.line_contact import line_contact
+from push_mpc.other_bodies import kept_off
 from push_mpc.settings import ControllerSettings
 from push_mpc.tick_report import tick_report
 from push_msgs.action import FollowTrajectory
@@ -56,7 +56,7 @@ class VelocityFollower:
             for other, radius in self._scenario.radii.items()
             if other != robot
         }
-        self.bodies = {robot, *self._scenario.objects, *self._others}
+        self.bodies: Collection[str] = {robot, *self._scenario.objects, *self._others}
         self._object = ""
         self._told_push: Push | None = None  # as it was planned
         self._beliefs = BeliefFeed(
@@ -186,17 +186,9 @@ class VelocityFollower:
         )
 
     def _around(self, me: Array) -> Array:
-        """Other bodies to keep away from ``(n, 3)``: x, y, least distance of the axle midpoint.
-
-        One that came closer than that is not fled from: it must come no closer.
-        """
-        rows = []
-        for name, reach in self._others.items():
-            pose = None if name == self._object else self._shell.poses.pose(name)
-            if pose is not None:
-                gap = math.hypot(pose[0] - me[0], pose[1] - me[1])
-                rows.append((pose[0], pose[1], min(reach, gap)))
-        return np.array(rows, dtype=np.float64).reshape(-1, 3)
+        """Other bodies ``(n, 3)`` to keep away from."""
+        others = {name: reach for name, reach in self._others.items() if name != self._object}
+        return kept_off(me, self._shell.poses.discs(others))
 
     def rest(self, dt: float, frame: Frame) -> Command:
         """See Follower."""
