@@ -6,11 +6,12 @@ at which tasks are refused are those of live use. Nothing here moves a robot.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from rclpy.node import Node
 
+from push_bringup.systems import nodes_of
 from push_job.method import Task
 from push_model import se2
 from push_model.arrays import Array
@@ -208,8 +209,19 @@ def run_team(
     if world:
         believed = believed.settings("bridge", world=world)
     believed, actual, drawn = doubt.draw(believed, seed)
+    believed = _told_latency(believed, system)
     with own_domain():
         return _run(system, believed, actual, task, limit, meanwhile, drawn)
+
+
+def _told_latency(believed: Scenario, system: str) -> Scenario:
+    """The latency that controllers are told, also for nodes of methods that make one good."""
+    delay = believed.parameters["controller"]["tracker"]["pose_delay"]
+    for node in nodes_of(system, believed):
+        for section, cls in node.traits.sections.items():
+            if section and any(f.name == "pose_delay" for f in fields(cls)):
+                believed = believed.settings(node.kind, **{f"{section}__pose_delay": delay})
+    return believed
 
 
 def _run(

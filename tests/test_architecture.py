@@ -86,7 +86,8 @@ def test_cores_know_neither_ros_nor_the_simulator(path):
     room, names = path.parts[0], imported(path)
     if room != "sim_bridge":
         assert "pybullet" not in names, path
-    if room in WITHOUT_ROS or (room in SHELLS and not is_shell(path)):
+    core = room in SHELLS and not is_shell(path)
+    if room in WITHOUT_ROS or core or path.name.startswith("one_robot_"):
         assert not names & ROS, f"{path} imports {names & ROS}"
 
 
