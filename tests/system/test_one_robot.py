@@ -35,9 +35,14 @@ def scenario(name):
 
 @pytest.mark.parametrize(("name", "doubt"), [("env1-target1", "none"), ("short", "mild")])
 def test_a_study_runs_it_and_the_object_ends_at_its_goal(name, doubt):
-    believed = scenario(name)
-    outcome = run_team(NAME, believed, Task((believed.goal,)), uncertainty(doubt), 1, 120.0)
+    believed, doubts, delays = scenario(name), uncertainty(doubt), set()
+
+    def watch(run, time, poses):
+        delays.add(run.supervisor.method._drive.tracker.settings.pose_delay)
+
+    outcome = run_team(NAME, believed, Task((believed.goal,)), doubts, 1, 120.0, watch)
     assert outcome.success, outcome.reason
+    assert delays == {doubts.latency[0]}, "it is told the latency, as a controller is"
     assert outcome.error[0] < 2e-3 and outcome.error[1] < 0.02
     assert outcome.pushes == 1 and outcome.replans == 0 and outcome.planning > 0.0
     assert {"positioning", "approach", "pushing", "detaching"} <= set(outcome.trace.phases)
