@@ -58,7 +58,8 @@ class Seen:
 
     time: [s] stamp of the frame. object: pose ``(3,)`` of its frame. robots: poses ``(3,)`` by
     name, of those of the team that are seen. obstacles ``(k, 3)``: x, y, radius [m] of other
-    bodies. now: [s] when the frame arrived; ``time`` where that is not known.
+    bodies. now: [s] when the frame arrived; ``time`` where that is not known. ages: [s] by name,
+    of poses that are not of this frame but of an earlier one; 0 where nothing is said.
     """
 
     time: float
@@ -66,6 +67,7 @@ class Seen:
     robots: Mapping[str, Array]
     obstacles: Array = field(default_factory=lambda: np.zeros((0, 3)))
     now: float = math.nan
+    ages: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

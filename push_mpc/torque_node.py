@@ -6,67 +6,52 @@ robot of this kind holds its wheels when it is told a velocity.
 
 import math
 import sys
-import time
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import TwistStamped
-from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Header
 
-from push_estimation.pose_gate import PoseGateSettings, Stamp
+from push_estimation.pose_gate import PoseGateSettings
 from push_model.settings import SettingsError
+from push_model.trajectory import Trajectory
+from push_mpc.follower_node import Command, Followed, FollowerKind, FollowerNode
 from push_mpc.torque_friction import FrictionTrustSettings
 from push_mpc.torque_observer import TorqueObserverSettings
 from push_mpc.torque_tracker import TorqueTick, TorqueTracker, TorqueTrackerSettings
 from push_mpc.torque_wheels import WheelFeed
 from push_mpc.wheel_slip_nmpc import WheelSlipNmpc, WheelSlipSettings
 from push_msgs.action import FollowTrajectory
-from push_msgs.msg import ControllerStatus, WheelTorques
-from push_ros.actions import GoalServer
+from push_msgs.msg import WheelTorques
 from push_ros.conversions import time_from_ros, trajectory_from_ros, twist_to_ros
-from push_ros.diagnostics import Diagnostics
-from push_ros.heartbeat import HeartbeatWatch
-from push_ros.names import inside, names_of_robot
 from push_ros.parameters import declare_settings
-from push_ros.pose_feed import Frame, PoseFeed
+from push_ros.pose_feed import Frame
 from push_ros.process import run_node
-from push_ros.qos import COMMAND, STATUS, STREAM
-from push_ros.validation import FRAME, InvalidMessage, check_frame, finite
-from push_scenario.scenario import Scenario, load_scenario
+from push_ros.qos import COMMAND, STREAM
+from push_ros.validation import InvalidMessage
+from push_scenario.scenario import Scenario
 
-_TICK = 0.01  # [s] assumed where the time since the last frame is not known
-_FEEDBACK_EVERY = 10  # frames
-_WATCH = 0.05  # [s] wall time between looks at the pose stream
+_SECTIONS = ("nmpc", "tracker", "observer", "friction", "poses")
 
 
-class TorqueControllerNode(Node):
-    """Answers every frame of the pose stream."""
+class TorqueFollower:
+    """Drives a robot by the torques of its right and its left wheel [Nm], see Follower."""
 
-    def __init__(
-        self, scenario: Scenario | None = None, robot: str = "", namespace: str = ""
-    ) -> None:
-        """namespace: the world's; the node lives in its robot's below it."""
-        super().__init__("torque_controller", namespace=inside(namespace, robot))
-        name = self.declare_parameter("scenario", "pioneer").value
-        robot = str(self.declare_parameter("robot", robot).value)
-        self._scenario = scenario or load_scenario(str(name))
-        self.robot, spec = self._scenario.robot(robot)
-        names = names_of_robot(self, self.robot)
-        values = dict(self._scenario.parameters.get("torque_controller", {}))
-        sections = {
-            k: values.pop(k, {}) for k in ("nmpc", "tracker", "observer", "friction", "poses")
-        }
+    sender = "sender"
+
+    def __init__(self, shell: FollowerNode) -> None:
+        self._shell, self._robot = shell, shell.robot
+        values = dict(shell.scenario.parameters.get("torque_controller", {}))
+        sections = {k: values.pop(k, {}) for k in _SECTIONS}
         if values:
             raise SettingsError(f"torque_controller: unknown key '{next(iter(values))}'")
 
         def declared(cls: type[Any], section: str) -> Any:
             where = f"torque_controller.{section}"
-            return declare_settings(self, cls, sections[section], section, where)
+            return declare_settings(shell, cls, sections[section], section, where)
 
-        nmpc = WheelSlipNmpc(declared(WheelSlipSettings, "nmpc"), spec)
+        nmpc = WheelSlipNmpc(declared(WheelSlipSettings, "nmpc"), shell.spec)
         nmpc.warm_up()
         self.tracker = TorqueTracker(
             declared(TorqueTrackerSettings, "tracker"),
@@ -74,186 +59,118 @@ class TorqueControllerNode(Node):
             declared(TorqueObserverSettings, "observer"),
             declared(FrictionTrustSettings, "friction"),
         )
-        self._held = 0.0  # [s] without a pose of the robot
-        self._wheels = WheelFeed()
-        self._ticks = 0
-        self._last_stamp = Header().stamp
-        self._mode, self._reason = ControllerStatus.IDLE, "no task"
-        self._diagnostics = Diagnostics(self, names, self._state)
-        events = self._diagnostics.publisher_events
-        topics = [names.robot(self.robot, t) for t in ("wheel_torques", "cmd_vel")]
-        self._torques = self.create_publisher(
+        self.gate: PoseGateSettings = declared(PoseGateSettings, "poses")
+        self.bodies: Collection[str] = {self._robot}
+        self.wheels = WheelFeed()
+        names, diagnostics = shell.names, shell.diagnostics
+        topics = [names.robot(self._robot, t) for t in ("wheel_torques", "cmd_vel", "joint_states")]
+        events = diagnostics.publisher_events
+        self._torques = shell.create_publisher(
             WheelTorques, topics[0], COMMAND, event_callbacks=events(topics[0])
         )
-        self._stand = self.create_publisher(
+        self._stand = shell.create_publisher(
             TwistStamped, topics[1], COMMAND, event_callbacks=events(topics[1])
         )
-        self._status = self.create_publisher(
-            ControllerStatus, names.robot(self.robot, "controller/status"), STATUS
-        )
-        self._server = GoalServer(
-            self,
-            FollowTrajectory,
-            names.robot(self.robot, "follow_trajectory"),
-            check=self._check,
-            start=self._begin,
-            cancel=self._canceled,
-            preempt=lambda request: self._preempt(),
-        )
-        gate = declared(PoseGateSettings, "poses")
-        self._poses = PoseFeed(self, names, gate, {self.robot}, self._diagnostics, self._on_frame)
-        joints = names.robot(self.robot, "joint_states")
-        events = self._diagnostics.subscription_events
-        self.create_subscription(
-            JointState, joints, self._on_wheels, STREAM, event_callbacks=events(joints)
-        )
-        self._heartbeat = HeartbeatWatch(self, names, self.robot, self._poses, self._diagnostics)
-        self._watched = time.monotonic()
-        self._watchdog = self.create_timer(
-            _WATCH, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        shell.create_subscription(
+            JointState,
+            topics[2],
+            self.take_wheels,
+            STREAM,
+            event_callbacks=diagnostics.subscription_events(topics[2]),
         )
 
-    def _check(self, request: Any) -> None:
-        """Raise InvalidMessage unless the goal is a trajectory of the robot alone."""
-        check_frame(request.trajectory.header.frame_id, "the trajectory")
-        finite(request.heartbeat_timeout, "the heartbeat timeout")
-        if request.heartbeat_timeout < 0.0:
-            raise InvalidMessage("the heartbeat timeout must not be negative; 0 watches none")
-        if request.mode != FollowTrajectory.Goal.MOVE:
-            raise InvalidMessage("it moves the robot; what it pushes is a disturbance")
-        trajectory_from_ros(request.trajectory)
-
-    def _begin(self, request: Any) -> None:
-        self._heartbeat.begin(float(request.heartbeat_timeout))
-        self._held = 0.0
-        self.tracker.start(trajectory_from_ros(request.trajectory))
-        self._mode, self._reason = ControllerStatus.MOVE, "following a trajectory"
-
-    def _preempt(self) -> None:
-        if self._server.active:
-            self._end(FollowTrajectory.Result.PREEMPTED, "a new trajectory replaces this one")
-
-    def _canceled(self) -> None:
-        self._end(FollowTrajectory.Result.CANCELED, "canceled")  # it brakes from the next frame on
-
-    def _end(self, code: int, message: str, tick: TorqueTick | None = None) -> None:
-        self.tracker.stop()
-        self._mode, self._reason = ControllerStatus.IDLE, message or "done"
-        result = FollowTrajectory.Result(error_code=int(code), error_msg=message)
-        if tick is not None:
-            result.position_error = math.hypot(float(tick.error[0]), float(tick.error[1]))
-            result.orientation_error = abs(float(tick.error[2]))
-        self._server.finish(result, success=code == 0)
-
-    def _on_frame(self, frame: Frame) -> None:
-        self._last_stamp = frame.stamp
-        if frame.verdict is Stamp.REFUSED:
-            self._publish(None)  # whatever time it is: stand still
-            return
-        if frame.verdict is Stamp.RESET:
-            self._heartbeat.reset()
-            if self.tracker.active:
-                self._end(FollowTrajectory.Result.CLOCK_RESET, "the clock went back")
-        dt = frame.elapsed or _TICK
-        pose = self._poses.pose(self.robot) if self.robot in frame.seen else None
-        if self.tracker.active and self._heartbeat.lost:
-            self._end(FollowTrajectory.Result.PREEMPTED, "the sender is gone")
-        if not self.tracker.active or pose is None:
-            self._wait(dt, pose)
-            return
-        self._held, self._ticks = 0.0, self._ticks + 1
-        wheels = self._wheels.at(time_from_ros(frame.stamp))
-        tick = self.tracker.tick(dt, pose, wheels)
-        self._publish(tick.torques)
-        failed = tick.solve is not None and not tick.solve.solved
-        self._mode = ControllerStatus.FALLBACK if failed else ControllerStatus.MOVE
-        if failed and tick.solve is not None:
-            self._reason = tick.solve.reason
-        self._publish_status(tick)
-        if tick.finished:
-            self._end(int(tick.code), tick.message, tick)
-        elif self._ticks % _FEEDBACK_EVERY == 0:
-            self._server.feedback(FollowTrajectory.Feedback(progress=tick.progress))
-
-    def _on_wheels(self, message: JointState) -> None:
+    def take_wheels(self, message: JointState) -> None:
         """Two wheels, left and right; others say nothing."""
-        why = self._wheels.take(
+        why = self.wheels.take(
             time_from_ros(message.header.stamp),
             np.array(message.position, dtype=np.float64),
             np.array(message.velocity, dtype=np.float64),
         )
         if why:
-            self._diagnostics.refuse("joint_states", why)
+            self._shell.diagnostics.refuse("joint_states", why)
 
-    def _wait(self, dt: float, pose: Any) -> None:
-        """Stand; a trajectory waits for a pose, but not for ever."""
-        self._publish(self.tracker.rest(dt, pose))
-        if self.tracker.active:
-            self._mode, self._reason = ControllerStatus.HOLD, f"no valid pose of {self.robot}"
-            self._held += dt
-            if self._held > self.tracker.settings.give_up:
-                why = f"{self._reason} for {self._held:.1f} s"
-                self._end(FollowTrajectory.Result.POSES_STALE, why)
-        self._publish_status(None)
+    def parse(self, request: Any) -> Trajectory:
+        """See Follower: a trajectory of the robot alone."""
+        if request.mode != FollowTrajectory.Goal.MOVE:
+            raise InvalidMessage("it moves the robot; what it pushes is a disturbance")
+        return trajectory_from_ros(request.trajectory)
 
-    def _publish(self, torques: tuple[float, float] | None) -> None:
-        if torques is None or not all(map(math.isfinite, torques)):
-            self._stand.publish(twist_to_ros(0.0, 0.0, self._last_stamp))
+    def begin(self, request: Any, task: Trajectory) -> None:
+        """See Follower."""
+        self.tracker.start(task)
+
+    def missing(self, frame: Frame) -> str:
+        """See Follower: the robot must be seen in every frame."""
+        return "" if self._pose(frame) is not None else self._robot
+
+    def _pose(self, frame: Frame) -> Any:
+        return self._shell.poses.pose(self._robot) if self._robot in frame.seen else None
+
+    def tick(self, dt: float, frame: Frame) -> Followed:
+        """See Follower."""
+        wheels = self.wheels.at(time_from_ros(frame.stamp))
+        tick = self.tracker.tick(dt, self._pose(frame), wheels)
+        failed = tick.solve is not None and not tick.solve.solved
+        away = math.hypot(float(tick.error[0]), float(tick.error[1]))
+        return Followed(
+            tick.torques,
+            tick.finished,
+            int(tick.code),
+            tick.message,
+            tick.progress,
+            (away, abs(float(tick.error[2]))),
+            tick.solve.reason if failed and tick.solve else "",
+            {**self.fields(), **_fields(tick)},
+            tick,
+        )
+
+    def rest(self, dt: float, frame: Frame) -> Command:
+        """See Follower: it brakes, and stands once it is at rest."""
+        return self.tracker.rest(dt, self._pose(frame))
+
+    def halt(self) -> None:
+        """See Follower: the estimate begins anew after a gap in the poses by itself."""
+
+    def canceled(self) -> None:
+        """See Follower: it brakes from the next frame on."""
+
+    def send(self, command: Command, stamp: Any) -> None:
+        """See Follower."""
+        if command is None or not all(map(math.isfinite, command)):
+            self._stand.publish(twist_to_ros(0.0, 0.0, stamp))
             return
-        message = WheelTorques(right=torques[0], left=torques[1])
-        message.header.stamp = self._last_stamp
+        message = WheelTorques(right=command[0], left=command[1])
+        message.header.stamp = stamp
         message.header.frame_id = "base_link"
         self._torques.publish(message)
 
-    def _publish_status(self, tick: TorqueTick | None) -> None:
-        tracker = self.tracker
-        message = ControllerStatus(
-            mode=self._mode,
-            robot=self.robot,
-            reason=self._reason,
-            solves=tracker.solves,
-            failures=tracker.failures,
-            curvature_margin=math.inf,
-            obstacle_margin=math.inf,
-            v=tracker.observer.v,
-            omega=tracker.observer.omega,
-        )
-        message.header.stamp = self._last_stamp
-        message.header.frame_id = FRAME
-        if tick is not None:
-            message.error_x, message.error_y, message.error_theta = map(float, tick.error)
-            if tick.solve is not None:
-                message.solve_time = tick.solve.solve_time
-                message.slack = tick.solve.violation
-        self._status.publish(message)
+    def fields(self) -> Mapping[str, float]:
+        """See Follower."""
+        return {"v": self.tracker.observer.v, "omega": self.tracker.observer.omega}
 
-    def _on_watchdog(self) -> None:
-        """Wall time: the pose stream may be dead, and with it every other clock."""
-        now = time.monotonic()
-        held_up, self._watched = now - self._watched > 2.0 * _WATCH, now
-        silence = self._poses.silence
-        if held_up or not self.tracker.active:
-            return
-        if silence < 2.0 * self._poses.gate.settings.timeout:
-            return
-        self._publish(None)
-        if silence > self.tracker.settings.give_up:
-            self._end(FollowTrajectory.Result.POSES_STALE, f"no poses for {silence:.1f} s")
+    def show(self, followed: Followed) -> None:
+        """See Follower: nothing else."""
 
-    def stop(self) -> None:
-        """Last act of a live process: stand."""
-        self._publish(None)
 
-    def _state(self) -> dict[str, Any]:
-        stale = self.tracker.active and self._poses.silence > 0.3
-        return {
-            "mode": self._mode,
-            "reason": self._reason,
-            "solves": self.tracker.solves,
-            "failures": self.tracker.failures,
-            "poses refused": self._poses.gate.refused,
-            "warning": "poses are stale" if stale else "",
-        }
+def _fields(tick: TorqueTick) -> dict[str, float]:
+    names = ("error_x", "error_y", "error_theta")
+    fields = dict(zip(names, map(float, tick.error), strict=True))
+    if tick.solve is not None:
+        fields |= {"solve_time": tick.solve.solve_time, "slack": tick.solve.violation}
+    return fields
+
+
+TORQUE_CONTROLLER = FollowerKind("torque_controller", "pioneer", TorqueFollower)
+
+
+class TorqueControllerNode(FollowerNode):
+    """A shell around a ``TorqueFollower``."""
+
+    def __init__(
+        self, scenario: Scenario | None = None, robot: str = "", namespace: str = ""
+    ) -> None:
+        """namespace: the world's; the node lives in its robot's below it."""
+        super().__init__(TORQUE_CONTROLLER, scenario, robot, namespace)
 
 
 def main() -> int:

@@ -4,10 +4,8 @@ import math
 import sys
 import time
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
-import numpy as np
 from nav_msgs.msg import Path
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -15,7 +13,6 @@ from rclpy.node import Node
 from push_model.arrays import Array
 from push_model.occupancy import OccupancyGrid as Grid
 from push_model.settings import SettingsError
-from push_model.traction import too_heavy
 from push_msgs.action import PlanPush
 from push_msgs.msg import PushPlan as PlanMessage
 from push_msgs.srv import PlanRobotPath
@@ -28,9 +25,10 @@ from push_planner import (
     Progress,
     PushPlan,
     PushPlanner,
-    plan_after_preemptive_push,
+    TooHeavy,
+    plan_among_bodies,
     plan_robot_path,
-    with_bodies,
+    warm_up,
 )
 from push_ros.actions import GoalServer
 from push_ros.belief_feed import BeliefFeed
@@ -51,10 +49,6 @@ from push_scenario.scenario import Scenario, load_scenario
 
 _SIGN_OF_LIFE = 0.5  # [s] wall time between feedback messages at most
 _MAP_PATIENCE = 5.0  # [s] wall time that a request waits for the first map
-
-
-class _TooHeavy(Exception):
-    """The robot cannot push the object; the text says what it needs and what there is."""
 
 
 class PlannerNode(Node):
@@ -105,10 +99,7 @@ class PlannerNode(Node):
         self._watchdog = self.create_timer(
             0.5, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
-        self._grid = self._scenario.grid  # to warm up, until a map comes
         self._warm_up()
-        self._grid = self._field = None
-        self._planners.clear()
 
     @property
     def ready(self) -> bool:
@@ -160,18 +151,12 @@ class PlannerNode(Node):
         return self._planners[key]
 
     def _warm_up(self) -> None:
-        """Load what is compiled before the first request: plan a short push."""
+        """Load what is compiled before the first request."""
         if not self._scenario.objects:
             return
-        start = next(iter(self._scenario.objects.values()))[1]
-        ahead = start + np.array([0.3 * np.cos(start[2]), 0.3 * np.sin(start[2]), 0.0])
         try:
-            scene = self._planner("", "").scene
-            quick = replace(
-                self.settings, improvement_rounds=0, rrt_iterations=50, max_expansions=2
-            )
-            PushPlanner(quick, scene.field, scene.robot, scene.item).solve(start, ahead)
-        except PlanningFailed as error:
+            warm_up(self.settings, self._scenario.robot()[1], self._scenario.object()[1])
+        except (PlanningFailed, SettingsError) as error:
             self.get_logger().debug(f"warm-up: {error}")
 
     def _begin(self, request: Any) -> None:
@@ -194,7 +179,7 @@ class PlannerNode(Node):
             goal = planar_pose(request.goal.pose, "the goal")
             self._work = self._plan(request, start, goal)
             self._continue()
-        except _TooHeavy as error:
+        except TooHeavy as error:
             self._fail(PlanPush.Result.TOO_HEAVY, str(error))
         except InvalidMessage as error:
             self._fail(PlanPush.Result.INVALID_GOAL, str(error))
@@ -208,25 +193,18 @@ class PlannerNode(Node):
 
         Raises
         ------
-        InvalidMessage, SettingsError, PlanningFailed: at once, of what is wrong with the request.
+        InvalidMessage, SettingsError, PlanningFailed, TooHeavy: at once, of what is wrong with the
+            request.
         """
         planner = self._planner(request.robot, request.object)
-        problem = too_heavy(planner.scene.robot, planner.scene.item)
-        if problem is not None:
-            raise _TooHeavy(problem)
         circles = circles_from_ros(request.obstacles)
-        if len(circles):
-            if circles[:, 2].min() < 0.0:
-                raise InvalidMessage("an obstacle's radius must not be negative")
-            scene, margin = planner.scene, self.settings.safety_distance
-            grid = with_bodies(scene.field.grid, circles, scene.item.outline, start, margin)
-            planner = PushPlanner(self.settings, grid, scene.robot, scene.item)
-        if request.mode == PlanPush.Goal.DIRECT:
-            return planner.plan(start, goal)
-        if request.mode != PlanPush.Goal.PREEMPTIVE:
+        if len(circles) and circles[:, 2].min() < 0.0:
+            raise InvalidMessage("an obstacle's radius must not be negative")
+        if request.mode not in (PlanPush.Goal.DIRECT, PlanPush.Goal.PREEMPTIVE):
             raise InvalidMessage(f"unknown mode {request.mode}")
-        self._draws += 1
-        return plan_after_preemptive_push(planner, start, goal, self.settings.seed + self._draws)
+        preemptive = request.mode == PlanPush.Goal.PREEMPTIVE
+        self._draws += preemptive
+        return plan_among_bodies(planner, start, goal, circles, self._draws * preemptive)
 
     def _continue(self) -> None:
         """Queue the next slice behind whatever else the executor has to do."""

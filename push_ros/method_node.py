@@ -286,8 +286,13 @@ class MethodNode(Node):
             return Told()
         self._missing, self._waiting = 0.0, self._poses.clock.now
         robots = {n: p for n in self.robots if (p := self._poses.pose(n)) is not None}
+        gate = self._poses.gate
         self._seen = seen = Seen(
-            self._poses.stamp, item, robots, self._poses.discs(self._roster.obstacles)
+            self._poses.stamp,
+            item,
+            robots,
+            self._poses.discs(self._roster.obstacles),
+            ages={n: gate.age(n) for n in (self.object, *robots) if n not in frame.seen},
         )
         if method is None or not self.busy:
             return Told()

@@ -6,13 +6,13 @@ at which tasks are refused are those of live use. Nothing here moves a robot.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from rclpy.node import Node
 
-from grasp_opt.group_control import GroupControlSettings
-from push_job.method import Task, method_spec
+from push_bringup.systems import nodes_of
+from push_job.method import Task
 from push_model import se2
 from push_model.arrays import Array
 from push_model.jobs import GoalRefused, JobError
@@ -213,22 +213,22 @@ def run_team(
     """
     if world:
         believed = believed.settings("bridge", world=world)
-    believed, actual, drawn = doubt.draw(believed, seed, _delayed(system))
+    believed, actual, drawn = doubt.draw(believed, seed)
+    believed = _told_latency(believed, system)
     if mistake is not None:
         believed = mistake(believed)
     with own_domain():
         return _run(system, believed, actual, task, limit, meanwhile, drawn)
 
 
-def _delayed(system: str) -> tuple[str, ...]:
-    """Methods whose settings say how old poses are."""
-    spec = method_spec(system)
-    control = None if spec is None else spec.sections.get("control")
-    return (
-        ("group",)
-        if control is not GroupControlSettings
-        else tuple(dict.fromkeys(("group", system)))
-    )
+def _told_latency(believed: Scenario, system: str) -> Scenario:
+    """The latency that controllers are told, also for nodes of methods that make one good."""
+    delay = believed.parameters["controller"]["tracker"]["pose_delay"]
+    for node in nodes_of(system, believed):
+        for section, cls in node.traits.sections.items():
+            if section and any(f.name == "pose_delay" for f in fields(cls)):
+                believed = believed.settings(node.kind, **{f"{section}__pose_delay": delay})
+    return believed
 
 
 def _run(

@@ -1,7 +1,7 @@
 """How far the world of a trial is from what planner, controller and supervisor believe."""
 
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -40,12 +40,8 @@ class Uncertainty:
     com: float = 0.0
     own_draws: bool = False
 
-    def draw(
-        self, believed: Scenario, seed: int, groups: Sequence[str] = ("group",)
-    ) -> tuple[Scenario, Scenario, Row]:
+    def draw(self, believed: Scenario, seed: int) -> tuple[Scenario, Scenario, Row]:
         """What is believed, with the motion capture of this trial; the world; the drawn values.
-
-        groups: names of the methods that have the group's settings of how old poses are.
 
         Raises
         ------
@@ -65,8 +61,7 @@ class Uncertainty:
             motion_capture__latency=latency,
             motion_capture__latency_jitter=self.latency_jitter,
         ).settings("controller", tracker__pose_delay=known)
-        for name in groups:
-            believed = believed.settings(name, control__pose_delay=known)
+        believed = believed.settings("group", control__pose_delay=known)
         drawn: Row = {} if low == high else {"latency_s": latency}
         objects = {}
         for name, (item, start) in believed.objects.items():

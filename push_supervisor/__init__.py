@@ -2,6 +2,8 @@
 
 from push_model.jobs import JobError
 from push_supervisor.commands import Command
+from push_supervisor.displacement import Displacement
+from push_supervisor.event_queue import EventQueue
 from push_supervisor.events import Event
 from push_supervisor.machine import Machine, State
 from push_supervisor.requests import Moment, Peer, Request, Requests, Step
@@ -10,7 +12,9 @@ from push_supervisor.surroundings import Surroundings
 
 __all__ = [
     "Command",
+    "Displacement",
     "Event",
+    "EventQueue",
     "JobError",
     "Machine",
     "Moment",

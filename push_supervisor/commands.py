@@ -72,7 +72,10 @@ class Finish:
     message: str
 
 
-Question = MakePlan | FindPath | FollowPath | FollowApproach | FollowPush | FollowRetreat
+Motion = FollowPath | FollowApproach | FollowPush | FollowRetreat
+"""Commands that a controller carries out."""
+
+Question = MakePlan | FindPath | Motion
 """Commands that another node answers."""
 
 Command = Question | CancelPlan | Stop | Finish

@@ -30,8 +30,10 @@ from push_ros.validation import FRAME
 from push_scenario.scenario import Scenario, load_scenario
 from push_supervisor import commands, events, motions
 from push_supervisor.commands import Command, Question
+from push_supervisor.displacement import Displacement
+from push_supervisor.event_queue import EventQueue
 from push_supervisor.events import Event
-from push_supervisor.machine import Machine, State
+from push_supervisor.machine import Machine
 from push_supervisor.peers import Peers
 from push_supervisor.requests import Moment, Peer, Request, Requests, Step
 from push_supervisor.settings import SupervisorSettings
@@ -72,10 +74,9 @@ class SupervisorNode(Node):
         self.machine = Machine(self.settings, self._at_goal, self._touching)
         self._requests = Requests(self.settings)
         self._ticks = 0
-        self._displaced = 0
+        self._displacement = Displacement(self.machine)
         self._world: Any = None  # what the world says that robot and object are
-        self._queue: list[Event] = []
-        self._handling = False
+        self._fire = EventQueue(self.machine, self._carry_out, self._publish_state).fire
         self._diagnostics = Diagnostics(self, self.names, self._diagnose)
         self._poses = PoseFeed(
             self, self.names, gate, list(bodies), self._diagnostics, self._on_frame, _POSE_PERIOD
@@ -207,21 +208,9 @@ class SupervisorNode(Node):
             self._tend()
 
     def _watch_displacement(self) -> None:
-        """Whether somebody moved the object while the robot was on its way to it."""
-        machine = self.machine
-        item = self._pose(self.object)
-        if machine.state not in (State.POSITIONING, State.APPROACH) or not machine.segments:
-            self._displaced = 0
-            return
-        if item is None:
-            return
-        way, turn = motions.displacement(machine.segment, item)
-        off = way > self.settings.displacement or turn > self.settings.displacement_turn
-        self._displaced = self._displaced + 1 if off else 0
-        if self._displaced >= 3:
-            self._displaced = 0
-            text = f"the object stands {1e3 * way:.0f} mm and {turn:.2f} rad from where the "
-            self._fire(events.ObjectMoved(text + "push was to begin"))
+        moved = self._displacement.look(self._pose(self.object))
+        if moved is not None:
+            self._fire(moved)
 
     def _pose(self, name: str) -> Array | None:
         """The pose ``(3,)`` of a body, None when it is not known now."""
@@ -237,24 +226,6 @@ class SupervisorNode(Node):
         return self.surroundings.touching(robot, item)
 
     # The machine and its requests
-
-    def _fire(self, event: Event) -> None:
-        """Give an event to the machine and carry out its commands, one event after the other."""
-        self._queue.append(event)
-        if self._handling:
-            return
-        self._handling = True
-        try:
-            while self._queue:
-                before = (self.machine.state, self.machine.reason)
-                told = self.machine.handle(self._queue.pop(0))
-                for command in told:
-                    self._carry_out(command)
-                ended = any(isinstance(command, commands.Finish) for command in told)
-                if ended or (self.machine.state, self.machine.reason) != before:
-                    self._publish_state()
-        finally:
-            self._handling = False
 
     def _carry_out(self, command: Command) -> None:
         if isinstance(command, (commands.Stop, commands.CancelPlan, commands.Finish)):
@@ -312,12 +283,8 @@ class SupervisorNode(Node):
                 peers.path(number, robot, wait, circles, crowded=len(circles) > 1)
             case commands.FollowPush(segment):
                 peers.push(number, segment, near.push(segment), heartbeat)
-            case commands.FollowPath(way):
-                peers.move(number, way, near.follow(way, item), heartbeat)
-            case commands.FollowApproach(segment):
-                peers.move(number, *near.approach(segment, robot, item), heartbeat)
-            case commands.FollowRetreat():
-                peers.move(number, *near.retreat(robot, item), heartbeat)
+            case _:
+                peers.move(number, *near.motion(command, robot, item), heartbeat)
 
     # Outputs
 

@@ -17,7 +17,7 @@ from push_model.push_segment import PushSegment
 from push_model.specs import ObjectSpec, RobotSpec
 from push_model.traction import too_heavy
 from push_model.trajectory import Trajectory
-from push_supervisor import motions
+from push_supervisor import commands, motions
 from push_supervisor.footprint import gap, overlaps
 from push_supervisor.settings import SupervisorSettings
 
@@ -116,6 +116,20 @@ class Surroundings:
         radius = self.robot.footprint_radius
         own = motions.outline_circles(se2.transform(item, self._item_outline), radius)
         return np.vstack([own, self.bodies(poses, radius)])
+
+    def motion(
+        self, command: commands.Motion, robot: Array, item: Array
+    ) -> tuple[Trajectory, Array]:
+        """The trajectory that a command asks for, and what to keep off along it."""
+        match command:
+            case commands.FollowPath(way):
+                return way, self.follow(way, item)
+            case commands.FollowApproach(segment):
+                return self.approach(segment, robot, item)
+            case commands.FollowPush(segment):
+                return segment.trajectory, self.push(segment)
+            case commands.FollowRetreat():
+                return self.retreat(robot, item)
 
     def follow(self, way: Trajectory, item: Array) -> Array:
         """What to keep off on the way to a stand-off: walls and the object."""

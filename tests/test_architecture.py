@@ -59,8 +59,8 @@ def imported(path):
 
 def is_shell(path):
     """Whether a file may know ROS: the node of a package, and how it talks to other nodes."""
-    names = ("node.py", "torque_node.py", "optimizer_node.py", "agent_node.py")
-    return path.name in (*names, "parameters.py", "peers.py") or path.name.endswith("_messages.py")
+    others = ("node.py", "parameters.py", "peers.py")
+    return path.name in others or path.name.endswith(("_node.py", "_messages.py"))
 
 
 FILES = sources()
@@ -86,7 +86,8 @@ def test_cores_know_neither_ros_nor_the_simulator(path):
     room, names = path.parts[0], imported(path)
     if room != "sim_bridge":
         assert "pybullet" not in names, path
-    if room in WITHOUT_ROS or (room in SHELLS and not is_shell(path)):
+    core = room in SHELLS and not is_shell(path)
+    if room in WITHOUT_ROS or core or path.name.startswith("one_robot_"):
         assert not names & ROS, f"{path} imports {names & ROS}"
 
 

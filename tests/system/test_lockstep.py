@@ -30,7 +30,7 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 
 NODE_MODULES = (
     "push_ros.pace_feed",
-    "push_mpc.node",
+    "push_mpc.follower_node",
     "sim_bridge.node",
     "sim_bridge.command_intake",
 )
@@ -226,7 +226,7 @@ def test_nan_poses_stop_the_robot_and_good_ones_let_it_go_on(short):
     tamper(short, change)
     moved(short, 0.3)
     assert moved(short, 0.5) < 1e-3
-    assert short.controller._poses.gate.refused > 20
+    assert short.controller.poses.gate.refused > 20
     assert ends(short).error_code == 0
     assert final_errors(short.observer.trace, short.scenario.goal)[0] < 0.02
 
@@ -318,7 +318,7 @@ def test_jumped_pose_is_not_chased(short):
 
     tamper(short, change)
     assert ends(short).error_code == 0
-    assert short.controller._poses.gate.jumps > 50
+    assert short.controller.poses.gate.jumps > 50
     assert final_errors(short.observer.trace, short.scenario.goal)[0] < 0.02
 
 

@@ -139,7 +139,7 @@ def test_wheel_states_of_nonsense_are_counted_and_change_nothing(run):
         run.spin(0.1)
     result = run.result(run.send(0.6))
     assert result.error_code == CODES.NONE, result.error_msg
-    assert run.node._diagnostics.refused["joint_states"] == 4
+    assert run.node.diagnostics.refused["joint_states"] == 4
 
 
 def test_without_poses_it_stands_and_gives_up():
@@ -159,8 +159,8 @@ def test_wheel_states_that_stop_coming_expire_and_it_goes_on_from_poses(run, mon
     believed them would take the end of the way for slip and trust the least friction there is."""
     answer = run.send(3.0).get_result_async()
     run.spin(3.0)
-    heard, kept = run.node._on_wheels, []
-    assert run.node._wheels.at(run.bridge.time - 0.01) is not None
+    heard, kept = run.node.follower.take_wheels, []
+    assert run.node.follower.wheels.at(run.bridge.time - 0.01) is not None
 
     def broken(message):
         kept.append(message)
@@ -173,11 +173,11 @@ def test_wheel_states_that_stop_coming_expire_and_it_goes_on_from_poses(run, mon
             monkeypatch.setattr(subscription, "callback", broken)
     run.spin(0.3)
     assert kept and abs(kept[0].velocity[0]) > 3.0  # it was driving
-    assert run.node._wheels.at(run.bridge.time) is None
+    assert run.node.follower.wheels.at(run.bridge.time) is None
     assert run.spinner.until(answer.done, 120.0)
     assert answer.result().result.error_code == CODES.NONE
     assert run.node.tracker.trust.part > 0.9
-    assert (run.node._diagnostics.refused.get("joint_states", 0) > 100) == (how == "frozen")
+    assert (run.node.diagnostics.refused.get("joint_states", 0) > 100) == (how == "frozen")
 
 
 def test_a_cancel_at_full_speed_skids_no_wheel(run):

@@ -130,5 +130,5 @@ def test_heartbeats_from_the_future_are_refused(stream):
     publisher = stream.node.create_publisher(Header, "/epuck1/heartbeat", STREAM)
     assert stream.spinner.until(lambda: publisher.get_subscription_count() > 0, 5.0)
     publisher.publish(Header(stamp=time_to_ros(1e6), frame_id="map"))
-    refused = stream.controller._diagnostics.refused
+    refused = stream.controller.diagnostics.refused
     assert stream.spinner.until(lambda: refused.get("/epuck1/heartbeat", 0) == 1, 5.0)

@@ -1,0 +1,110 @@
+"""What one robot plans: pushes of its object, and its own way to the next one. No ROS, no clock."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from push_job.method import Seen
+from push_model.arrays import Array
+from push_model.distance_field import DistanceField
+from push_model.jobs import JobError
+from push_model.specs import ObjectSpec, RobotSpec
+from push_planner import (
+    NoRobotPath,
+    PlanError,
+    PlannerSettings,
+    PlanningFailed,
+    Progress,
+    PushPlan,
+    PushPlanner,
+    TooHeavy,
+    plan_among_bodies,
+    plan_robot_path,
+    warm_up,
+)
+from push_supervisor import Surroundings, commands, events, motions
+
+_NO_BODY_MATTERS = (PlanError.INVALID_GOAL, PlanError.OUTSIDE_MAP)
+
+
+class Plans:
+    """Answers MakePlan and FindPath, one at a time."""
+
+    def __init__(
+        self, settings: PlannerSettings, field: DistanceField, robot: RobotSpec, item: ObjectSpec
+    ) -> None:
+        self._settings, self._field = settings, field
+        self._draws = 0  # pre-emptive pushes asked for: each draws others
+        self._planner: PushPlanner | None = None
+        self._work: Iterator[Progress] | None = None
+        self.believe(robot, item)
+        try:
+            warm_up(settings, robot, item)
+        except PlanningFailed:
+            pass  # an object that cannot be pushed is refused with its goal
+
+    def planner(self, robot: RobotSpec, item: ObjectSpec) -> PushPlanner:
+        """For a robot and an object; that at work where they are as is believed."""
+        if (robot, item) != (self._robot, self._item):
+            return PushPlanner(self._settings, self._field, robot, item)
+        if self._planner is None:
+            self._planner = PushPlanner(self._settings, self._field, robot, item)
+        return self._planner
+
+    def believe(self, robot: RobotSpec, item: ObjectSpec) -> None:
+        """Go on with another belief: a plan that is being made is begun anew."""
+        self._robot, self._item = robot, item
+        self._planner = self._work = None
+
+    def drop(self) -> None:
+        """No plan is wanted any more."""
+        self._work = None
+
+    def plan(self, command: commands.MakePlan, seen: Seen) -> events.Event | None:
+        """Do one slice of the work on a plan; the plan, or why there is none, after the last."""
+        if self._work is None:
+            self._draws += command.preemptive
+            self._best: PushPlan | None = None
+            self._work = self._begin(command.goal, seen, self._draws * command.preemptive)
+        try:
+            self._best = next(self._work).best
+            return None
+        except StopIteration:
+            assert self._best is not None
+            answer: events.Event = events.PlanFound(self._best.segments)
+        except TooHeavy as error:
+            answer = events.PlanFailed(JobError.TOO_HEAVY, str(error))
+        except PlanningFailed as failure:
+            retry = failure.code is PlanError.NO_PUSH_SEQUENCE
+            crowded = len(seen.obstacles) > 0 and failure.code not in _NO_BODY_MATTERS
+            answer = events.PlanFailed(job_error(failure), str(failure), retry, crowded)
+        self._work = None
+        return answer
+
+    def _begin(self, goal: Array, seen: Seen, preemptive: int) -> Iterator[Progress]:
+        planner = self.planner(self._robot, self._item)
+        yield from plan_among_bodies(planner, seen.object, goal, seen.obstacles, preemptive)
+
+    def way(
+        self, command: commands.FindPath, robot: Array, seen: Seen, near: Surroundings
+    ) -> events.Event:
+        """The robot's way to where its next push begins."""
+        to = motions.standoff(command.segment, seen.object)
+        others = wider(seen.obstacles, self._robot.footprint_radius)
+        circles = np.vstack([near.on_the_way(seen.object, {}), others])
+        try:
+            way = plan_robot_path(self._field, self._robot, self._settings, robot, to, circles)
+        except NoRobotPath as error:
+            return events.PathFailed(str(error), crowded=len(others) > 0)
+        return events.PathFound(way)
+
+
+def job_error(failure: PlanningFailed) -> JobError:
+    """The job's code of the same name; PLANNING_FAILED where it has none."""
+    return JobError.__members__.get(failure.code.name, JobError.PLANNING_FAILED)
+
+
+def wider(discs: Array, by: float) -> Array:
+    """Discs ``(n, 3)`` x, y, radius [m], of greater radii."""
+    grown: Array = discs + np.array([0.0, 0.0, by])
+    return grown

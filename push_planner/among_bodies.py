@@ -1,0 +1,43 @@
+"""One request for a plan: among the bodies that stand around now, direct or pre-emptive."""
+
+from collections.abc import Iterator
+
+from push_model.arrays import Array
+from push_model.traction import too_heavy
+from push_planner.bodies import with_bodies
+from push_planner.planner import PushPlanner
+from push_planner.preemptive import plan_after_preemptive_push
+from push_planner.push_plan import Progress
+
+
+class TooHeavy(Exception):
+    """The robot cannot push the object; the text says what it needs and what there is."""
+
+
+def plan_among_bodies(
+    planner: PushPlanner, start: Array, goal: Array, circles: Array, preemptive: int = 0
+) -> Iterator[Progress]:
+    """The work on a request, in slices as of ``PushPlanner.plan``.
+
+    Parameters
+    ----------
+    start, goal: poses ``(3,)`` of the object's geometric frame.
+    circles: ``(n, 3)`` [m] x, y, radius of other bodies.
+    preemptive: 0 for a direct plan; else the number of this request for a pre-emptive push, since
+        each draws others.
+
+    Raises
+    ------
+    TooHeavy: at once. PlanningFailed: see ``PushPlanner.plan``.
+    """
+    scene, settings = planner.scene, planner.settings
+    problem = too_heavy(scene.robot, scene.item)
+    if problem is not None:
+        raise TooHeavy(problem)
+    if len(circles):
+        margin = settings.safety_distance
+        grid = with_bodies(scene.field.grid, circles, scene.item.outline, start, margin)
+        planner = PushPlanner(settings, grid, scene.robot, scene.item)
+    if preemptive:
+        return plan_after_preemptive_push(planner, start, goal, settings.seed + preemptive)
+    return planner.plan(start, goal)
