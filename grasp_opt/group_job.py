@@ -29,20 +29,29 @@ class GroupJobSettings:
     """When a job is done, and when it is given up."""
 
     position_tolerance: float = bounded(
-        5e-3, low=1e-4, high=1.0, doc="distance to the goal position at which a job is done (m)"
+        5e-3,
+        low=1e-4,
+        high=1.0,
+        doc="Distance of the object from the goal position within which the job is done (m).",
     )
     orientation_tolerance: float = bounded(
-        0.03, low=1e-3, high=3.2, doc="angle to the goal orientation at which a job is done (rad)"
+        0.03,
+        low=1e-3,
+        high=3.2,
+        doc="Angle of the object from the goal orientation within which the job is done (rad).",
     )
     failures: int = bounded(
-        4, low=0, high=100, doc="consecutive failed steps after which the next failure ends the job"
+        4,
+        low=0,
+        high=100,
+        doc="Number of failed steps in a row that is tolerated; one more ends the job.",
     )
-    steps: int = bounded(40, low=1, high=1000, doc="greatest number of pushes in a job")
+    steps: int = bounded(40, low=1, high=1000, doc="Maximum number of pushes in a job.")
     moving: float = bounded(
         180.0,
         low=1.0,
         high=3600.0,
-        doc="time limit for robots to reach their places between two pushes (s)",
+        doc="Time limit for the robots to reach their places between two pushes (s).",
     )
 
 
