@@ -160,7 +160,7 @@ class GroupJob:
     def _begin(self, task: Task) -> None:
         self.error = JobError.NONE
         self._task, self._tally, self._step = task, Tally(), Step()
-        self._enter(JobPhase.DETACHING, "robots come away from the object")
+        self._enter(JobPhase.DETACHING, "robots back off from the object")
 
     def end(self, code: JobError, message: str) -> None:
         """End the job under way."""
@@ -198,7 +198,7 @@ class GroupJob:
         if self.dead and not self._tally.revived:
             self._tally.revived = True
             self.dead = ()
-            self._enter(JobPhase.DETACHING, f"{message}; those that did not move are tried again")
+            self._enter(JobPhase.DETACHING, f"{message}; robots that did not move are tried again")
             return
         self.end(code, message)
 
@@ -250,7 +250,7 @@ class GroupJob:
         still, late = self._watch.step(now, robots, twists)
         if not still and not late:
             return True
-        self._lost(still, "robots take too long to their places" if late else "")
+        self._lost(still, "robots did not reach their places in time" if late else "")
         return False
 
     def _lost(self, dead: tuple[int, ...], reason: str) -> None:
@@ -258,7 +258,7 @@ class GroupJob:
         self.dead = tuple(sorted({*self.dead, *dead}))
         if dead:
             reason = f"going on without {len(self.dead)} of {self._count} robots: " + (
-                reason or "it does not move although told to"
+                reason or "it does not move although commanded to"
             )
         tally = self._tally
         tally.failed()
@@ -290,7 +290,8 @@ class GroupJob:
             self.end(JobError.NONE, f"at the goal: {1e3 * away:.1f} mm, {turned:.3f} rad")
             return
         if tally.pushes >= s.steps or task.over:
-            text = f"{1e3 * away:.1f} mm and {turned:.3f} rad off after {tally.pushes} pushes"
+            error = f"{1e3 * away:.1f} mm and {turned:.3f} rad"
+            text = f"the object is {error} from the goal after {tally.pushes} pushes"
             self.end(JobError.OFF_TARGET, text)
             return
         self._enter(JobPhase.PLANNING, "planning the next step")
@@ -316,7 +317,7 @@ class GroupJob:
             self._push_settings,
             self._control,
         )
-        self._enter(JobPhase.APPROACH, "robots look for contact")
+        self._enter(JobPhase.APPROACH, "robots approach the object")
         return 0.0 * twists
 
     def _push_on(self, now: float, pose: Array, robots: Array) -> Array:
@@ -333,7 +334,7 @@ class GroupJob:
             self._tally.pushed()
             self._task.done_until(plan.trajectory.duration, more=self._tally.left > 0)
             self._watch.since = now
-            self._enter(JobPhase.DETACHING, "the piece is done")
+            self._enter(JobPhase.DETACHING, "the push is done")
         elif step.phase is Phase.FAILED:
             self._watch.since = now
             # A robot that was only held fast moves when it backs off; one that does not is dead.

@@ -282,15 +282,15 @@ class GroupPush:
         assert self._begin is not None
         dead = self._obedience.step(now, robots, twists)
         if dead and len(dead) < len(robots):
-            return f"{_count(dead)} not move although told to", dead
+            return f"{_count(dead)} not move although commanded to", dead
         away, turned = self._errors(pose)
         if away > s.position_error or turned > s.orientation_error:
-            return f"the object is {1e3 * away:.0f} mm and {turned:.2f} rad off its way", ()
+            return f"the object is {1e3 * away:.0f} mm and {turned:.2f} rad from its trajectory", ()
         if searching:
             late = now - self._begin > s.search
-            return ("not every robot found contact" if late else ""), ()
+            return ("not every robot made contact with the object" if late else ""), ()
         if now - self._moved_on > s.stalled:
-            return f"the object stays {1e3 * away:.0f} mm behind", ()
+            return f"the object stays {1e3 * away:.0f} mm behind the trajectory", ()
         return "", ()
 
 

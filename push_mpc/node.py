@@ -175,7 +175,9 @@ class ControllerNode(Node):
         check_frame(request.trajectory.header.frame_id, "the trajectory")
         finite(request.heartbeat_timeout, "the heartbeat timeout")
         if request.heartbeat_timeout < 0.0:
-            raise InvalidMessage("the heartbeat timeout must not be negative; 0 watches none")
+            raise InvalidMessage(
+                "the heartbeat timeout must not be negative; 0 turns the check off"
+            )
         trajectory = trajectory_from_ros(request.trajectory)
         tolerances = (request.position_tolerance, request.orientation_tolerance)
         finite(tolerances, "a tolerance")
@@ -184,7 +186,7 @@ class ControllerNode(Node):
             raise InvalidMessage(f"unknown object '{request.object}'")
         if request.mode == FollowTrajectory.Goal.PUSH:
             if not request.object:
-                raise InvalidMessage("a push needs its object")
+                raise InvalidMessage("a push needs the name of its object")
             grasp = planar_pose(request.contact, "the contact")
             item = self._beliefs.current.object(request.object)
             line = line_contact(self._spec, item, grasp)
@@ -243,7 +245,7 @@ class ControllerNode(Node):
         if frame.verdict is Stamp.RESET:
             self._heartbeat.reset()
             if self.tracker.active:
-                self._end(FollowTrajectory.Result.CLOCK_RESET, "the clock went back")
+                self._end(FollowTrajectory.Result.CLOCK_RESET, "the clock jumped back")
         if frame.verdict is Stamp.RESUMED:
             self.tracker.halt()
         self._step(frame.elapsed or _TICK, frame.seen)
@@ -251,7 +253,7 @@ class ControllerNode(Node):
     def _step(self, dt: float, seen: frozenset[str]) -> None:
         tracker = self.tracker
         if tracker.active and self._heartbeat.lost:
-            self._end(FollowTrajectory.Result.PREEMPTED, "the supervisor is gone")
+            self._end(FollowTrajectory.Result.PREEMPTED, "no heartbeat of the supervisor arrives")
         if not tracker.active:
             tracker.rest(dt)
             self._publish_command(0.0, 0.0)

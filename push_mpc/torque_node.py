@@ -118,9 +118,14 @@ class TorqueControllerNode(Node):
         check_frame(request.trajectory.header.frame_id, "the trajectory")
         finite(request.heartbeat_timeout, "the heartbeat timeout")
         if request.heartbeat_timeout < 0.0:
-            raise InvalidMessage("the heartbeat timeout must not be negative; 0 watches none")
+            raise InvalidMessage(
+                "the heartbeat timeout must not be negative; 0 turns the check off"
+            )
         if request.mode != FollowTrajectory.Goal.MOVE:
-            raise InvalidMessage("it moves the robot; what it pushes is a disturbance")
+            raise InvalidMessage(
+                "the torque controller accepts only the mode MOVE; an object that is pushed is "
+                "a disturbance"
+            )
         trajectory_from_ros(request.trajectory)
 
     def _begin(self, request: Any) -> None:
@@ -153,11 +158,11 @@ class TorqueControllerNode(Node):
         if frame.verdict is Stamp.RESET:
             self._heartbeat.reset()
             if self.tracker.active:
-                self._end(FollowTrajectory.Result.CLOCK_RESET, "the clock went back")
+                self._end(FollowTrajectory.Result.CLOCK_RESET, "the clock jumped back")
         dt = frame.elapsed or _TICK
         pose = self._poses.pose(self.robot) if self.robot in frame.seen else None
         if self.tracker.active and self._heartbeat.lost:
-            self._end(FollowTrajectory.Result.PREEMPTED, "the sender is gone")
+            self._end(FollowTrajectory.Result.PREEMPTED, "no heartbeat of the sender arrives")
         if not self.tracker.active or pose is None:
             self._wait(dt, pose)
             return

@@ -156,7 +156,9 @@ class TorqueTracker:
             return self._ended(TrackError.OFF_COURSE, _away(off), error, progress)
         if self._time > trajectory.duration + s.settle_time:
             if off > s.position_tolerance or turned > s.orientation_tolerance:
-                why = f"ended {1e3 * off:.0f} mm and {turned:.2f} rad off"
+                why = (
+                    f"the trajectory ended with an error of {1e3 * off:.0f} mm and {turned:.2f} rad"
+                )
                 return self._ended(TrackError.TIMEOUT, why, error, progress)
             return self._ended(TrackError.NONE, "", error, progress)
         self.controller.trusted = self._friction
@@ -237,4 +239,4 @@ class TorqueTracker:
 
 
 def _away(off: float) -> str:
-    return f"{1e3 * off:.0f} mm from the reference"
+    return f"the robot is {1e3 * off:.0f} mm from its reference"

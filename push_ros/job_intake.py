@@ -177,7 +177,11 @@ class JobIntake:
         why = "a new goal replaces this one"
         if same:  # whoever waited for it waits no longer; the job goes on
             code = int(JobError.PREEMPTED)
-            self.finish(MoveObject.Result(error_code=code, error_msg="somebody else takes over"))
+            self.finish(
+                MoveObject.Result(
+                    error_code=code, error_msg="another client has taken over the job"
+                )
+            )
         elif self._owner.busy or self._owner.plan_ready:
             self._owner.end_job(JobError.PREEMPTED, why)
 

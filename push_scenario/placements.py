@@ -124,7 +124,7 @@ class RandomPlacement:
             else:
                 raise SettingsError(
                     f"no room found for number {i + 1} of {count} in {_TRIES} tries; "
-                    "expected a larger area, a smaller gap or fewer"
+                    "enlarge 'area', or reduce 'gap' or 'count'"
                 )
             poses[i] = x, y, theta if self.heading is None else self.heading
             circles[len(taken) + i] = x, y, radius

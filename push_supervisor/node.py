@@ -135,7 +135,7 @@ class SupervisorNode(Node):
         if self._world is not None:
             for name, body in zip((self.robot, self.object), self._world, strict=True):
                 if body is None:
-                    text = f"there is no '{name}' in the world"
+                    text = f"no body '{name}' in the world; use a name of the scenario"
                     raise GoalRefused(JobError.UNKNOWN_OBJECT, text)
         self.surroundings.check_goal(goal)
 
@@ -172,7 +172,7 @@ class SupervisorNode(Node):
         if before is not None and before != now:
             gone = [n for n, b in zip((self.robot, self.object), now, strict=True) if b is None]
             what = f"without {' and '.join(gone)}" if gone else "with another robot or object"
-            self.end_job(JobError.UNKNOWN_OBJECT, f"the world is a new one, {what}")
+            self.end_job(JobError.UNKNOWN_OBJECT, f"another scenario was loaded, {what}")
 
     def _on_frame(self, frame: Frame) -> None:
         """Frames come every 50 ms."""
@@ -207,8 +207,8 @@ class SupervisorNode(Node):
         self._displaced = self._displaced + 1 if off else 0
         if self._displaced >= 3:
             self._displaced = 0
-            text = f"the object stands {1e3 * way:.0f} mm and {turn:.2f} rad from where the "
-            self._fire(events.ObjectMoved(text + "push was to begin"))
+            text = f"the object is {1e3 * way:.0f} mm and {turn:.2f} rad from the planned "
+            self._fire(events.ObjectMoved(text + "start of the push"))
 
     def _pose(self, name: str) -> Array | None:
         """The pose ``(3,)`` of a body, None when it is not known now."""
