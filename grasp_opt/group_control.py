@@ -36,64 +36,95 @@ class GroupControlSettings:
     """Gains of (3.20) and (3.25)."""
 
     law: Literal["twist", "printed"] = bounded(
-        "twist", doc="control law: robots follow the object's feasible twist, or (3.25) as printed"
+        "twist",
+        doc="Control law of the robots: 'twist' (they follow the feasible twist of the object) "
+        "or 'printed' (they follow their contact forces, (3.25) of the thesis as printed).",
     )
     position_gain: float = bounded(
-        40.0, low=0.0, high=1e4, doc="gain K_P of (3.20) on position errors of the object (N/m)"
+        40.0,
+        low=0.0,
+        high=1e4,
+        doc="Proportional gain K_P of (3.20): force per position error of the object (N/m).",
     )
     orientation_gain: float = bounded(
         6.0,
         low=0.0,
         high=1e4,
-        doc="gain K_P of (3.20) on orientation errors of the object (Nm/rad)",
+        doc="Proportional gain K_P of (3.20): torque per orientation error of the object (Nm/rad).",
     )
     velocity_gain: float = bounded(
-        2.0, low=0.0, high=1e4, doc="gain K_D of (3.20) on velocity errors of the object (Ns/m)"
+        2.0,
+        low=0.0,
+        high=1e4,
+        doc="Derivative gain K_D of (3.20): force per velocity error of the object (N s/m).",
     )
     turning_gain: float = bounded(
-        0.1, low=0.0, high=1e4, doc="gain K_D of (3.20) on turn rate errors of the object (Nms/rad)"
+        0.1,
+        low=0.0,
+        high=1e4,
+        doc="Derivative gain K_D of (3.20): torque per turn rate error of the object (Nm s/rad).",
     )
     place_gain: float = bounded(
         0.05,
         low=0.0,
         high=100.0,
-        doc="gain K_PR of (3.25) on a robot position along the outline (1/s)",
+        doc="Gain K_PR of (3.25): speed of a robot along the outline per distance from its "
+        "place (1/s).",
     )
     gap_gain: float = bounded(
-        2.0, low=0.0, high=100.0, doc="gain on the gap between a robot and the object (1/s)"
+        2.0,
+        low=0.0,
+        high=100.0,
+        doc="Speed at which a robot closes its gap to the object, divided by the gap (1/s).",
     )
     lost: float = bounded(
-        5e-3, low=1e-4, high=1.0, doc="gap from which a robot counts as out of contact (m)"
+        5e-3,
+        low=1e-4,
+        high=1.0,
+        doc="Gap between robot and object above which the robot counts as out of contact (m).",
     )
     approach: float = bounded(
         0.02,
         low=0.0,
         high=1.0,
-        doc="greatest speed of a robot relative to the object when it closes a gap (m/s)",
+        doc="Highest speed relative to the object at which a robot closes its gap to the "
+        "object (m/s).",
     )
     force_gain: float = bounded(
         0.002,
         low=0.0,
         high=10.0,
-        doc="gain K_VR of (3.25) from contact force to robot speed (m/s/N)",
+        doc="Gain K_VR of (3.25): robot speed per contact force (m/s/N).",
     )
     correction: float = bounded(
         2.0,
         low=1.0,
         high=10.0,
-        doc="greatest object speed under corrections, as a multiple of the trajectory speed",
+        doc="Highest speed of the object while errors are corrected, as a multiple of the "
+        "speed of the trajectory (dimensionless).",
     )
     apart: float = bounded(
-        8e-3, low=0.0, high=1.0, doc="gap between two robots below which they are driven apart (m)"
+        8e-3, low=0.0, high=1.0, doc="Gap between two robots below which they are driven apart (m)."
     )
     apart_gain: float = bounded(
-        0.5, low=0.0, high=100.0, doc="separation speed per missing gap between two robots (1/s)"
+        0.5,
+        low=0.0,
+        high=100.0,
+        doc="Speed at which two robots are driven apart, divided by the missing gap (1/s).",
     )
     lead: float = bounded(
-        0.025, low=1e-3, high=1.0, doc="distance of the controlled point ahead of the axle (m)"
+        0.025,
+        low=1e-3,
+        high=1.0,
+        doc="Distance ahead of the axle of the point whose velocity a robot on wheels controls "
+        "(m).",
     )
     pose_delay: float = bounded(
-        0.0, low=0.0, high=1.0, doc="latency of the pose stream, from measurement to command (s)"
+        0.0,
+        low=0.0,
+        high=1.0,
+        doc="Latency of the pose stream that the group compensates, from measurement to "
+        "command (s).",
     )
 
 

@@ -29,20 +29,29 @@ class GroupJobSettings:
     """When a job is done, and when it is given up."""
 
     position_tolerance: float = bounded(
-        5e-3, low=1e-4, high=1.0, doc="distance to the goal position at which a job is done (m)"
+        5e-3,
+        low=1e-4,
+        high=1.0,
+        doc="Distance of the object from the goal position within which the job is done (m).",
     )
     orientation_tolerance: float = bounded(
-        0.03, low=1e-3, high=3.2, doc="angle to the goal orientation at which a job is done (rad)"
+        0.03,
+        low=1e-3,
+        high=3.2,
+        doc="Angle of the object from the goal orientation within which the job is done (rad).",
     )
     failures: int = bounded(
-        4, low=0, high=100, doc="consecutive failed steps after which the next failure ends the job"
+        4,
+        low=0,
+        high=100,
+        doc="Number of failed steps in a row that is tolerated; one more ends the job.",
     )
-    steps: int = bounded(40, low=1, high=1000, doc="greatest number of pushes in a job")
+    steps: int = bounded(40, low=1, high=1000, doc="Maximum number of pushes in a job.")
     moving: float = bounded(
         180.0,
         low=1.0,
         high=3600.0,
-        doc="time limit for robots to reach their places between two pushes (s)",
+        doc="Time limit for the robots to reach their places between two pushes (s).",
     )
 
 
@@ -151,7 +160,7 @@ class GroupJob:
     def _begin(self, task: Task) -> None:
         self.error = JobError.NONE
         self._task, self._tally, self._step = task, Tally(), Step()
-        self._enter(JobPhase.DETACHING, "robots come away from the object")
+        self._enter(JobPhase.DETACHING, "robots back off from the object")
 
     def end(self, code: JobError, message: str) -> None:
         """End the job under way."""
@@ -189,7 +198,7 @@ class GroupJob:
         if self.dead and not self._tally.revived:
             self._tally.revived = True
             self.dead = ()
-            self._enter(JobPhase.DETACHING, f"{message}; those that did not move are tried again")
+            self._enter(JobPhase.DETACHING, f"{message}; robots that did not move are tried again")
             return
         self.end(code, message)
 
@@ -241,7 +250,7 @@ class GroupJob:
         still, late = self._watch.step(now, robots, twists)
         if not still and not late:
             return True
-        self._lost(still, "robots take too long to their places" if late else "")
+        self._lost(still, "robots did not reach their places in time" if late else "")
         return False
 
     def _lost(self, dead: tuple[int, ...], reason: str) -> None:
@@ -249,7 +258,7 @@ class GroupJob:
         self.dead = tuple(sorted({*self.dead, *dead}))
         if dead:
             reason = f"going on without {len(self.dead)} of {self._count} robots: " + (
-                reason or "it does not move although told to"
+                reason or "it does not move although commanded to"
             )
         tally = self._tally
         tally.failed()
@@ -281,7 +290,8 @@ class GroupJob:
             self.end(JobError.NONE, f"at the goal: {1e3 * away:.1f} mm, {turned:.3f} rad")
             return
         if tally.pushes >= s.steps or task.over:
-            text = f"{1e3 * away:.1f} mm and {turned:.3f} rad off after {tally.pushes} pushes"
+            error = f"{1e3 * away:.1f} mm and {turned:.3f} rad"
+            text = f"the object is {error} from the goal after {tally.pushes} pushes"
             self.end(JobError.OFF_TARGET, text)
             return
         self._enter(JobPhase.PLANNING, "planning the next step")
@@ -307,7 +317,7 @@ class GroupJob:
             self._push_settings,
             self._control,
         )
-        self._enter(JobPhase.APPROACH, "robots look for contact")
+        self._enter(JobPhase.APPROACH, "robots approach the object")
         return 0.0 * twists
 
     def _push_on(self, now: float, pose: Array, robots: Array) -> Array:
@@ -324,7 +334,7 @@ class GroupJob:
             self._tally.pushed()
             self._task.done_until(plan.trajectory.duration, more=self._tally.left > 0)
             self._watch.since = now
-            self._enter(JobPhase.DETACHING, "the piece is done")
+            self._enter(JobPhase.DETACHING, "the push is done")
         elif step.phase is Phase.FAILED:
             self._watch.since = now
             # A robot that was only held fast moves when it backs off; one that does not is dead.

@@ -57,7 +57,7 @@ def plan_from_ros(message: PlanMessage, names: Sequence[str]) -> GroupPlan:
         pushers = tuple(number[name] for name in message.pushers)
         moves = [(m.batch, number[m.robot], m) for m in message.moves]
     except KeyError as error:
-        raise InvalidMessage(f"robot {error} is not of the group") from None
+        raise InvalidMessage(f"robot {error} is not in the group") from None
     contacts = Contacts(
         np.column_stack([message.contact_x, message.contact_y]),
         np.column_stack([message.normal_x, message.normal_y]),
@@ -92,7 +92,9 @@ def trajectory_from_ros(message: Any, item: ObjectSpec) -> ObjectTrajectory:
     arrays = [np.asarray(a, dtype=np.float64) for a in (message.time, message.x, message.y)]
     arrays.append(np.asarray(message.theta, dtype=np.float64))
     if len({len(a) for a in arrays}) != 1 or len(arrays[0]) > _LONGEST:
-        raise InvalidMessage("time, x, y, theta must be equally long, and not endless")
+        raise InvalidMessage(
+            f"time, x, y, theta must be equally long, with at most {_LONGEST} samples"
+        )
     for array in arrays:
         finite(array, "the trajectory")
     pose = np.column_stack(arrays[1:])

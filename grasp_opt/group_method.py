@@ -89,9 +89,11 @@ class GroupMethod:
             text = "a group takes one goal at a time, or a trajectory with times"
             return Refusal(JobError.INVALID_GOAL, text)
         if math.isnan(task.goal[2]):
-            return Refusal(JobError.INVALID_GOAL, "a group needs the heading of its goal")
+            return Refusal(JobError.INVALID_GOAL, "the goal of a group needs a heading")
         if self._finder.clearance(item.mass_pose(task.goal), Obstacles())[0] <= 0.0:
-            return Refusal(JobError.GOAL_OCCUPIED, "the object does not fit there")
+            return Refusal(
+                JobError.GOAL_OCCUPIED, "at the goal the object needs room for robots all around it"
+            )
         return Certificate(robots=2)
 
     def _begins_here(
@@ -103,7 +105,8 @@ class GroupMethod:
         away, turned = float(np.hypot(off[0], off[1])), abs(float(off[2]))
         s = self.job.settings
         if away > 4.0 * s.position_tolerance or turned > 4.0 * s.orientation_tolerance:
-            text = f"the object is {1e3 * away:.0f} mm, {turned:.2f} rad from where it begins"
+            error = f"{1e3 * away:.0f} mm and {turned:.2f} rad"
+            text = f"the object is {error} from where the trajectory begins"
             return Refusal(JobError.INVALID_GOAL, text)
         return Certificate(robots=2, seconds=trajectory.duration)
 
@@ -256,13 +259,17 @@ def check_team(robots: Mapping[str, RobotSpec], item: ObjectSpec) -> None:
     convex object."""
     types, count = list(robots.values()), len(robots)
     if any(t != types[0] for t in types):
-        raise SettingsError("has robots of several types; a group is of one type")
+        raise SettingsError("has robots of several types; a group needs robots of one type")
     if not isinstance(types[0].bumper, RingBumper) or not isinstance(types[0].drive, SpeedDrive):
-        raise SettingsError("has robots without a ring bumper and wheels of controlled speed")
+        raise SettingsError(
+            "has robots without a ring bumper and speed-controlled wheels, which a group needs"
+        )
     if not 2 <= count <= MOST:
-        raise SettingsError(f"has {count} robots; a group is of 2 to {MOST}")
+        raise SettingsError(f"has {count} robots; a group needs 2 to {MOST}")
     if not item.geometry.convex:
-        raise SettingsError("pushes an object whose outline is not convex; groups push convex ones")
+        raise SettingsError(
+            "pushes an object whose outline is not convex; a group needs a convex one"
+        )
 
 
 GROUP = MethodSpec("group", GroupMethod, SECTIONS, check_team, "group-ellipse")

@@ -37,67 +37,79 @@ class GroupPushSettings:
         1e-3,
         low=1e-5,
         high=0.1,
-        doc="gap between a robot and the object that counts as contact (m)",
+        doc="Gap between robot and object below which they count as in contact (m).",
     )
     steady: float = bounded(
         0.1,
         low=0.0,
         high=10.0,
-        doc="time for which all robots must be in contact before a push begins (s)",
+        doc="Time for which all robots must be in contact before a push begins (s).",
     )
     search: float = bounded(
-        8.0, low=0.1, high=600.0, doc="time limit for all robots to make contact (s)"
+        8.0,
+        low=0.1,
+        high=600.0,
+        doc="Time limit for all robots to make contact with the object (s).",
     )
     behind: float = bounded(
         0.01,
         low=1e-4,
         high=1.0,
-        doc="object error from which the trajectory slows down; it stops at twice this (m)",
+        doc="Distance of the object from the trajectory at which the trajectory slows down; at "
+        "twice this distance it stops (m).",
     )
     position_error: float = bounded(
-        0.05, low=1e-3, high=10.0, doc="position error of the object at which a push fails (m)"
+        0.05, low=1e-3, high=10.0, doc="Position error of the object at which a push fails (m)."
     )
     orientation_error: float = bounded(
-        0.3, low=0.01, high=7.0, doc="orientation error of the object at which a push fails (rad)"
+        0.3, low=0.01, high=7.0, doc="Orientation error of the object at which a push fails (rad)."
     )
     stalled: float = bounded(
-        4.0, low=0.1, high=600.0, doc="time without progress after which a push fails (s)"
+        4.0,
+        low=0.1,
+        high=600.0,
+        doc="Time without progress of the object after which a push fails (s).",
     )
     dead: float = bounded(
         1.0,
         low=0.1,
         high=60.0,
-        doc="time without commanded motion after which a robot is considered dead (s)",
+        doc="Time without the commanded motion after which a robot is considered dead (s).",
     )
     dead_way: float = bounded(
         0.01,
         low=1e-4,
         high=1.0,
-        doc="least commanded path in that time for a robot to be judged dead or alive (m)",
+        doc="Distance that a robot must be commanded to move within the time 'dead' before it "
+        "is judged dead or alive (m).",
     )
     position_noise: float = bounded(
         2e-4,
         low=1e-6,
         high=0.1,
-        doc="standard deviation of measured positions, for the velocity filter (m)",
+        doc="Standard deviation of measured positions that the velocity filter of the object "
+        "assumes (m).",
     )
     orientation_noise: float = bounded(
         1.7e-3,
         low=1e-6,
         high=0.5,
-        doc="standard deviation of measured headings, for the velocity filter (rad)",
+        doc="Standard deviation of measured headings that the velocity filter of the object "
+        "assumes (rad).",
     )
     acceleration: float = bounded(
         0.3,
         low=1e-3,
         high=100.0,
-        doc="standard deviation of object acceleration, for the velocity filter (m/s^2)",
+        doc="Standard deviation of the object's acceleration that the velocity filter assumes "
+        "(m/s^2).",
     )
     turning: float = bounded(
         1.5,
         low=1e-3,
         high=1000.0,
-        doc="standard deviation of object angular acceleration, for the velocity filter (rad/s^2)",
+        doc="Standard deviation of the object's angular acceleration that the velocity filter "
+        "assumes (rad/s^2).",
     )
 
 
@@ -270,15 +282,15 @@ class GroupPush:
         assert self._begin is not None
         dead = self._obedience.step(now, robots, twists)
         if dead and len(dead) < len(robots):
-            return f"{_count(dead)} not move although told to", dead
+            return f"{_count(dead)} not move although commanded to", dead
         away, turned = self._errors(pose)
         if away > s.position_error or turned > s.orientation_error:
-            return f"the object is {1e3 * away:.0f} mm and {turned:.2f} rad off its way", ()
+            return f"the object is {1e3 * away:.0f} mm and {turned:.2f} rad from its trajectory", ()
         if searching:
             late = now - self._begin > s.search
-            return ("not every robot found contact" if late else ""), ()
+            return ("not every robot made contact with the object" if late else ""), ()
         if now - self._moved_on > s.stalled:
-            return f"the object stays {1e3 * away:.0f} mm behind", ()
+            return f"the object stays {1e3 * away:.0f} mm behind the trajectory", ()
         return "", ()
 
 

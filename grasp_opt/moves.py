@@ -17,36 +17,55 @@ from push_model.settings import bounded, settings
 class MoveSettings:
     """Speeds and what counts as there."""
 
-    speed: float = bounded(0.1, low=1e-3, high=5.0, doc="speed of robots between pushes (m/s)")
+    speed: float = bounded(
+        0.1,
+        low=1e-3,
+        high=5.0,
+        doc="Speed of robots that drive to their places between two pushes (m/s).",
+    )
     deceleration: float = bounded(
         0.15,
         low=1e-3,
         high=50.0,
-        doc="deceleration of robots before a corner of their path (m/s^2)",
+        doc="Deceleration of robots before a corner of their path between two pushes (m/s^2).",
     )
     turn_rate: float = bounded(
-        2.0, low=1e-2, high=50.0, doc="greatest turn rate of robots between pushes (rad/s)"
+        2.0, low=1e-2, high=50.0, doc="Highest turn rate of robots between two pushes (rad/s)."
     )
-    turn_gain: float = bounded(4.0, low=0.1, high=100.0, doc="turn rate per heading error (1/s)")
+    turn_gain: float = bounded(
+        4.0,
+        low=0.1,
+        high=100.0,
+        doc="Turn rate of a robot divided by its heading error, between two pushes (1/s).",
+    )
     turn_first: float = bounded(
         0.12,
         low=1e-3,
         high=3.0,
-        doc="heading error from which a robot stops and turns in place (rad)",
+        doc="Heading error above which a robot stops and turns in place before it drives on (rad).",
     )
     near: float = bounded(
-        3e-3, low=1e-4, high=0.1, doc="distance at which a point of the path counts as reached (m)"
+        3e-3,
+        low=1e-4,
+        high=0.1,
+        doc="Distance from a corner of the path within which a robot continues to the next one "
+        "(m).",
     )
     straight: float = bounded(
-        0.02, low=1e-3, high=1.0, doc="heading error at which a turn in place ends (rad)"
+        0.02,
+        low=1e-3,
+        high=1.0,
+        doc="Heading error below which a robot ends a turn in place and drives on (rad).",
     )
     slowest: float = bounded(
-        0.01, low=1e-4, high=1.0, doc="least speed near a corner of the path (m/s)"
+        0.01, low=1e-4, high=1.0, doc="Lowest speed of a robot near a corner of its path (m/s)."
     )
     back_off: float = bounded(
-        0.03, low=0.0, high=1.0, doc="gap to which robots back off from the object after a push (m)"
+        0.03, low=0.0, high=1.0, doc="Gap to the object to which robots back off after a push (m)."
     )
-    back_speed: float = bounded(0.03, low=1e-3, high=1.0, doc="speed of robots that back off (m/s)")
+    back_speed: float = bounded(
+        0.03, low=1e-3, high=1.0, doc="Speed at which robots back off from the object (m/s)."
+    )
 
 
 @dataclass

@@ -71,7 +71,7 @@ class OptimizerClient:
             self._sent = False
             self._client.forget()
             if seen.time - self._since > PATIENCE:
-                raise PlanFailed(JobError.NODE_LOST, "the grasp optimizer is not there")
+                raise PlanFailed(JobError.NODE_LOST, "the grasp optimizer is not in the ROS graph")
         found, self._found = self._found, None
         if isinstance(found, PlanFailed):
             raise found

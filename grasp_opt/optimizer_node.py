@@ -191,7 +191,7 @@ class OptimizerNode(Node):
         if request.object not in ("", self.object):
             raise SettingsError(f"unknown object '{request.object}'")
         if not request.robots or len(request.robots) != len(request.places):
-            raise InvalidMessage("each robot needs its place")
+            raise InvalidMessage("the request needs one pose for each robot")
         pose = self._item.mass_pose(planar_pose(request.start, "the start"))
         robots = np.array([planar_pose(p, "a robot") for p in request.places])
         number = {name: i for i, name in enumerate(request.robots)}

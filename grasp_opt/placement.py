@@ -260,7 +260,7 @@ class Placer:
         candidates = self.grid(points) if points else (yield from self.candidates())
         if not len(candidates):
             raise NoPlacement(
-                f"{self.count} robots of {1e3 * self.radius:.0f} mm find no room round the object"
+                f"{self.count} robots of {1e3 * self.radius:.0f} mm find no room around the object"
             )
         costs = np.empty(len(candidates))
         for k, way in enumerate(candidates):
@@ -276,7 +276,7 @@ class Placer:
                 yield
         if not order:
             raise NoPlacement(
-                f"no placement of {self.count} robots holds the task with a margin of "
+                f"no placement of {self.count} robots supports the task with a margin of "
                 f"{self.settings.least_margin:g} and {self.settings.most_force:g} N a robot"
             )
         found = []

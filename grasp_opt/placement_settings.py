@@ -10,36 +10,49 @@ class PlacementSettings:
     """Weights of (3.16) and room between robots."""
 
     model: Literal["limit_surface", "printed"] = bounded(
-        "limit_surface", doc="motion model of the object: its limit surface, or (3.17) as printed"
+        "limit_surface",
+        doc="Model of the object's motion in (3.16): 'limit_surface' or (3.17) as printed.",
     )
     steps: int = bounded(
-        50, low=5, high=1000, doc="number N of time steps into which (3.16) divides the task"
+        50, low=5, high=1000, doc="Number N of time steps into which (3.16) divides the task."
     )
     position_weight: float = bounded(
-        1e4, low=1e-6, high=1e9, doc="weight Q of position errors in (3.16) (1/m^2)"
+        1e4, low=1e-6, high=1e9, doc="Weight Q of position errors in the cost (3.16) (1/m^2)."
     )
     orientation_weight: float = bounded(
-        200.0, low=0.0, high=1e9, doc="weight Q of orientation errors in (3.16) (1/rad^2)"
+        200.0, low=0.0, high=1e9, doc="Weight Q of orientation errors in the cost (3.16) (1/rad^2)."
     )
     force_weight: float = bounded(
         0.05,
         low=1e-9,
         high=1e9,
-        doc="weight R of contact forces in (3.16), as fractions of the floor friction",
+        doc="Weight R of contact forces in the cost (3.16); forces are fractions of the floor "
+        "friction (dimensionless).",
     )
-    gap: float = bounded(5e-3, low=0.0, high=1.0, doc="least gap between two robots (m)")
+    gap: float = bounded(
+        5e-3, low=0.0, high=1.0, doc="Least gap between the bodies of two robots that push (m)."
+    )
     corner: float = bounded(
-        0.015, low=0.0, high=1.0, doc="least distance of a contact from a corner of the outline (m)"
+        0.015,
+        low=0.0,
+        high=1.0,
+        doc="Least distance of a contact from a corner of the object's outline (m).",
     )
     least_margin: float = bounded(
-        -1.0, low=-1.0, high=1.0, doc="least margin of the grasp-task compatibility test, a sine"
+        -1.0,
+        low=-1.0,
+        high=1.0,
+        doc="Least margin of the grasp-task compatibility test that a placement must have: the "
+        "sine of an angle (dimensionless).",
     )
     only_pushing: bool = bounded(
-        False, doc="accept only placements in which every robot pushes during the whole task"
+        False,
+        doc="Whether only placements are accepted in which every robot pushes during the whole "
+        "task.",
     )
     most_force: float = bounded(
         1e6,
         low=1e-3,
         high=1e6,
-        doc="greatest force that a robot can exert, limited by its traction (N)",
+        doc="Highest force that a robot may exert, at most its traction (N).",
     )

@@ -1,6 +1,6 @@
-"""What a group does next: a piece of the object's way, who pushes where, and who goes there how.
+"""Plans one step of a group: a piece of the object's path, the placement, and the robots' paths.
 
-Planned anew after each piece, from where everybody is: nothing has to go as it was planned before.
+Each step is planned from the present poses, so it does not depend on the success of the last one.
 """
 
 import math
@@ -212,8 +212,8 @@ class StepPlanner:
         room = self._finders[0].clearance(poses, Obstacles(discs=scene.still(self._radius)))
         if room.min() < self.settings.clearance:
             k = int(np.argmin(room))
-            raise NoStep(f"the object is too close to something {times[k]:.1f} s along its way")
-        why: Exception = NoStep("it has no length")
+            raise NoStep(f"the object is too close to an obstacle {times[k]:.1f} s along its way")
+        why: Exception = NoStep("the trajectory has no length")
         for part in _PARTS:
             end = part * trajectory.duration
             task = trajectory if part == 1.0 else trajectory.between(0.0, end)

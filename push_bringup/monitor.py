@@ -117,12 +117,12 @@ class Monitor:
     def missing(self) -> str:
         """What a goal still waits for, for a person."""
         if not self.supervised:
-            return f"nobody publishes {self._names.team('job_state')}"
+            return f"no node publishes {self._names.team('job_state')}"
         if not self._map:
             return f"no map on {self._names.world('map')}"
         if self.pose is None:
             return f"no pose of the object on {self._names.world('poses')}"
-        return "" if self.ready else f"nobody listens to {self._names.team('goal_pose')}"
+        return "" if self.ready else f"no node subscribes to {self._names.team('goal_pose')}"
 
     @property
     def goal_topic(self) -> str:
@@ -207,17 +207,19 @@ class Monitor:
             return self.unfinished("the nodes have ended before the job")
         if owner is Owner.SILENT:
             return self.unfinished(
-                f"the node that owns the job has not been heard of for {SILENCE:g} s; if it is "
-                "only frozen, the job goes on when it wakes",
+                f"the node that owns the job has published nothing for {SILENCE:g} s; if it is "
+                "only frozen, the job may continue later",
                 JobError.OWNER_SILENT,
             )
         if owner is Owner.MISSING:
             self._missed = True
             if not before:
-                text = "the node that owns the job is not heard of; it may be frozen, or have died"
+                text = (
+                    "the node that owns the job publishes nothing; it may be frozen, or have died"
+                )
                 self._tell("silent", text)
         elif owner is Owner.RETURNED:
-            self._tell("returned", "the node that owns the job is heard of again")
+            self._tell("returned", "the node that owns the job publishes again")
         return None
 
     def _forgotten(self) -> JobResult:

@@ -121,7 +121,7 @@ class Suite:
                 self.check()
                 if self._stopping:
                     raise SuiteFailed("stopped before the nodes were up")
-                raise SuiteFailed(f"the nodes did not come up: {monitor.missing()}")
+                raise SuiteFailed(f"the nodes did not start in time: {monitor.missing()}")
 
     def _alive(self) -> bool:
         self.check()

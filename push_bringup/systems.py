@@ -115,7 +115,7 @@ def single(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
             whose = f"team '{team.name}'" if team.name else "its only team"
             raise SettingsError(
                 f"scenario '{scenario.name}': {whose} has {len(team.robots)} robots, the system "
-                "'single' takes one a team; say under 'teams' who moves what"
+                "'single' needs one per team; list under 'teams' which robot pushes which object"
             )
         if not team.object:
             raise SettingsError(f"scenario '{scenario.name}' has no object to push")
@@ -163,7 +163,9 @@ def method(name: str, scenario: Scenario, namespace: str = "") -> tuple[NodeSpec
     nodes = [NodeSpec("bridge", "bridge", world, world)]
     spec = {"group": GROUP, "swarm": SWARM}.get(name) or method_spec(name)
     if spec is None:
-        raise SettingsError(f"no method called '{name}'")
+        raise SettingsError(
+            f"no method called '{name}'; name an installed one, or MODULE:ATTRIBUTE"
+        )
     for team in teams_of(scenario):
         whose = f"scenario '{scenario.name}': " + (f"team '{team.name}'" if team.name else "it")
         if not team.robots:

@@ -22,49 +22,63 @@ class PoseGateSettings:
     """When a pose is too old or too far."""
 
     timeout: float = bounded(
-        0.15, low=0.01, high=5.0, doc="Age at which the last pose of a body is stale (s)."
+        0.15,
+        low=0.01,
+        high=5.0,
+        doc="Age of the last pose of a body above which it counts as stale (s).",
     )
     max_speed: float = bounded(
-        0.5, low=0.01, high=20.0, doc="Speed that a body can plausibly have (m/s)."
+        0.5,
+        low=0.01,
+        high=20.0,
+        doc="Highest plausible speed of a body (m/s); a faster change of position is rejected "
+        "as a jump.",
     )
     max_turn_rate: float = bounded(
-        10.0, low=0.1, high=100.0, doc="Turn rate that a body can plausibly have (rad/s)."
+        10.0,
+        low=0.1,
+        high=100.0,
+        doc="Highest plausible turn rate of a body (rad/s); a faster change of heading is "
+        "rejected as a jump.",
     )
     jump_margin: float = bounded(
         0.02,
         low=0.0,
         high=1.0,
-        doc="Distance between two poses that is accepted beyond what max_speed explains (m).",
+        doc="Distance that two successive poses may differ in addition to max_speed times "
+        "their time difference (m).",
     )
     turn_margin: float = bounded(
         0.2,
         low=0.0,
         high=3.2,
-        doc="Angle between two poses that is accepted beyond what max_turn_rate explains (rad).",
+        doc="Angle that two successive poses may differ in addition to max_turn_rate times "
+        "their time difference (rad).",
     )
     persistence: int = bounded(
         10,
         low=1,
         high=1000,
-        doc="Frames that an implausible pose must persist before it is accepted.",
+        doc="Number of frames for which an implausible pose must persist before it is accepted.",
     )
     reset_gap: float = bounded(
         0.5,
         low=0.01,
         high=60.0,
-        doc="Step back of the stamps from which on it counts as a reset of the clock (s).",
+        doc="Backward step of the stamps above which it counts as a reset of the clock (s).",
     )
     leap: float = bounded(
         10.0,
         low=0.1,
         high=3600.0,
-        doc="Step ahead of a stamp from which on it is refused at first (s).",
+        doc="Forward step of a stamp above which the frame is rejected at first (s).",
     )
     stamp_persistence: int = bounded(
         3,
         low=1,
         high=1000,
-        doc="Frames in a row that make a reset, or a large step ahead, accepted.",
+        doc="Number of frames in a row that must agree before a reset or a large forward step "
+        "of the stamps is accepted.",
     )
 
 

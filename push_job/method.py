@@ -1,7 +1,8 @@
-"""A method: data in, data out. No ROS, no clock, no hidden knowledge.
+"""The protocol of a method: an algorithm that moves one object with the robots of a team.
 
-Whatever moves an object by pushing is a method: a group, a swarm under any law, a rival. A node
-hosts one (``push_ros/method_node.py``), a study runs it in the graph, and a notebook steps it::
+A method imports no ROS and reads no clock; it knows only its arguments. The group, the swarm with
+any law and the rivals of the studies are methods. ``push_ros/method_node.py`` runs one as a node,
+a study runs it in lockstep, and a notebook steps it::
 
     method = SPEC.make(arena)
     method.begin(Task((goal,)), 0.0)

@@ -24,7 +24,8 @@ class FlatBumper:
         None,
         low=1e-3,
         high=2.0,
-        doc="Height of its middle above the floor (m); default: the axle's",
+        doc="Height of the middle of the bumper above the floor (m); default: the height of "
+        "the axle",
     )
     height: float = bounded(0.006, low=1e-3, high=1.0, doc="Height of the face (m)")
 
@@ -55,7 +56,8 @@ class RingBumper:
         None,
         low=1e-3,
         high=2.0,
-        doc="Height of its middle above the floor (m); default: the axle's",
+        doc="Height of the middle of the bumper above the floor (m); default: the height of "
+        "the axle",
     )
     height: float = bounded(0.006, low=1e-3, high=1.0, doc="Height of the ring (m)")
 

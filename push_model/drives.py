@@ -22,7 +22,8 @@ class SpeedDrive(DifferentialDrive):
         0.0,
         low=0.0,
         high=100.0,
-        doc="Inertia of a wheel with its geared motor (kg m^2); 0: that of a solid ball",
+        doc="Inertia of a wheel with its geared motor about the axle (kg m^2); 0: that of a "
+        "solid ball",
     )
     wheel_friction: float = bounded(
         1.0, low=0.0, high=3.0, doc="Friction coefficient of wheel and floor"

@@ -46,7 +46,10 @@ class EndCheck:
         """Verdict on a task that has ended."""
         late = self._overtime > self._settings.settle_time
         if late and not self._within(gap, turn, _NEARLY):
-            return TrackError.TIMEOUT, f"ended {1e3 * gap:.1f} mm and {turn:.3f} rad off"
+            return (
+                TrackError.TIMEOUT,
+                f"the trajectory ended with an error of {1e3 * gap:.1f} mm and {turn:.3f} rad",
+            )
         return FINE
 
     def _within(self, gap: float, turn: float, factor: float) -> bool:
@@ -95,7 +98,7 @@ class FailureCheck:
     def _off_course(self, error: Array) -> Verdict:
         off = float(np.hypot(error[0], error[1]))
         if off > self._settings.off_course:
-            return TrackError.OFF_COURSE, f"{1e3 * off:.0f} mm from the reference"
+            return TrackError.OFF_COURSE, f"the robot is {1e3 * off:.0f} mm from its reference"
         return FINE
 
     def _contact(self, dt: float, grasp: GraspEstimate) -> Verdict:
@@ -114,7 +117,7 @@ class FailureCheck:
         limit = self._settings.blocked_time
         if halted > limit:
             return TrackError.STUCK, (
-                f"the reference waited {limit:.1f} s for the robot; is the way blocked?"
+                f"the reference waited {limit:.1f} s for the robot, which seems blocked"
             )
         return FINE
 
@@ -128,7 +131,8 @@ class FailureCheck:
             way = float(np.hypot(moved[0], moved[1])) + self._lever * abs(float(moved[2]))
             if self._commanded > s.stuck_way and way < _MOVED * self._commanded:
                 return TrackError.STUCK, (
-                    f"commanded {1e3 * self._commanded:.0f} mm in {span:.1f} s but moved "
+                    f"the robot was commanded {1e3 * self._commanded:.0f} mm in {span:.1f} s "
+                    "but moved "
                     f"{1e3 * way:.1f} mm"
                 )
             self._history.clear()

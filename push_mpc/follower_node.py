@@ -176,7 +176,9 @@ class FollowerNode(Node):
         check_frame(request.trajectory.header.frame_id, "the trajectory")
         finite(request.heartbeat_timeout, "the heartbeat timeout")
         if request.heartbeat_timeout < 0.0:
-            raise InvalidMessage("the heartbeat timeout must not be negative; 0 watches none")
+            raise InvalidMessage(
+                "the heartbeat timeout must not be negative; 0 turns the check off"
+            )
         return self.follower.parse(request)
 
     def _begin(self, request: Any) -> None:
@@ -215,7 +217,7 @@ class FollowerNode(Node):
         if frame.verdict is Stamp.RESET:
             self._heartbeat.reset()
             if self.tracker.active:
-                self.end(FollowTrajectory.Result.CLOCK_RESET, "the clock went back")
+                self.end(FollowTrajectory.Result.CLOCK_RESET, "the clock jumped back")
         if frame.verdict is Stamp.RESUMED:
             self.follower.halt()
         self._step(frame.elapsed or _TICK, frame)
@@ -223,7 +225,9 @@ class FollowerNode(Node):
     def _step(self, dt: float, frame: Frame) -> None:
         follower = self.follower
         if self.tracker.active and self._heartbeat.lost:
-            self.end(FollowTrajectory.Result.PREEMPTED, f"the {follower.sender} is gone")
+            self.end(
+                FollowTrajectory.Result.PREEMPTED, f"no heartbeat of the {follower.sender} arrives"
+            )
         if not self.tracker.active:
             self.send(follower.rest(dt, frame))
             self._publish_status(None)

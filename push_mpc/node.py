@@ -129,7 +129,7 @@ class VelocityFollower:
             raise InvalidMessage(f"unknown object '{request.object}'")
         if request.mode == FollowTrajectory.Goal.PUSH:
             if not request.object:
-                raise InvalidMessage("a push needs its object")
+                raise InvalidMessage("a push needs the name of its object")
             grasp = planar_pose(request.contact, "the contact")
             item = self._beliefs.current.object(request.object)
             line = line_contact(self._spec, item, grasp)

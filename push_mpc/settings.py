@@ -9,7 +9,11 @@ from push_model.settings import SettingsError, bounded, settings
 class ControllerSettings:
     """Settings of the node itself."""
 
-    controller: str = bounded("ltv", doc="Name of the predictive controller: ltv or contact_force")
+    controller: str = bounded(
+        "ltv",
+        doc="Name of the predictive controller: 'ltv' (curvature constraint) or "
+        "'contact_force' (contact forces)",
+    )
 
 
 @settings
@@ -27,16 +31,20 @@ class MpcSettings:
     horizon: int = bounded(20, low=2, high=100, doc="Number p of predicted steps")
     state_weight: tuple[float, float, float, float, float] = bounded(
         (40.0, 60.0, 1.0, 0.5, 0.02),
-        doc="Diagonal of Q: weights of e_x, e_y, e_theta, e_v, e_omega",
+        doc="Diagonal of the weight matrix Q: weights of the errors e_x, e_y, e_theta, e_v, "
+        "e_omega",
     )
     terminal_factor: float = bounded(
         5.0, low=0.0, high=1000.0, doc="Factor of the terminal weight, P = factor * Q"
     )
     input_weight: tuple[float, float] = bounded(
-        (0.05, 0.002), doc="Diagonal of R_u: weights of the two accelerations"
+        (0.05, 0.002),
+        doc="Diagonal of the weight matrix R_u: weights of the linear and the angular acceleration",
     )
     input_rate_weight: tuple[float, float] = bounded(
-        (0.05, 0.002), doc="Diagonal of R_du: weights of the changes of the two accelerations"
+        (0.05, 0.002),
+        doc="Diagonal of the weight matrix R_du: weights of the changes of the linear and the "
+        "angular acceleration",
     )
     max_acceleration: float = bounded(
         0.3, low=0.01, high=20.0, doc="Limit of the linear acceleration (m/s^2)"
@@ -45,17 +53,28 @@ class MpcSettings:
         6.0, low=0.01, high=200.0, doc="Limit of the angular acceleration (rad/s^2)"
     )
     max_acceleration_change: float = bounded(
-        0.3, low=0.001, high=50.0, doc="Change of the linear acceleration per step (m/s^2)"
+        0.3,
+        low=0.001,
+        high=50.0,
+        doc="Limit of the change of the linear acceleration in one step (m/s^2)",
     )
     max_turn_acceleration_change: float = bounded(
-        6.0, low=0.001, high=500.0, doc="Change of the angular acceleration per step (rad/s^2)"
+        6.0,
+        low=0.001,
+        high=500.0,
+        doc="Limit of the change of the angular acceleration in one step (rad/s^2)",
     )
-    max_obstacles: int = bounded(20, low=0, high=200, doc="Number of nearest obstacles in the QP")
+    max_obstacles: int = bounded(
+        20,
+        low=0,
+        high=200,
+        doc="Number of obstacles, the nearest ones, for which the controller has constraints",
+    )
     slack_linear: float = bounded(
-        1000.0, low=0.0, high=1e6, doc="Linear penalty of violating a soft constraint"
+        1000.0, low=0.0, high=1e6, doc="Linear penalty on the violation of a soft constraint"
     )
     slack_quadratic: float = bounded(
-        20000.0, low=1e-3, high=1e8, doc="Quadratic penalty of violating a soft constraint"
+        20000.0, low=1e-3, high=1e8, doc="Quadratic penalty on the violation of a soft constraint"
     )
     max_wheel_slack: float = bounded(
         0.01,
@@ -73,10 +92,12 @@ class MpcSettings:
         0.005,
         low=1e-6,
         high=100.0,
-        doc="Depth inside an obstacle's circle above which the solve counts as failed (m)",
+        doc="Depth inside the safety circle of an obstacle above which the solve counts as "
+        "failed (m)",
     )
     backend: Literal["active_set", "daqp", "osqp"] = bounded(
-        "active_set", doc="Solver of the quadratic programme"
+        "active_set",
+        doc="Solver of the quadratic programme of the controller: 'active_set', 'daqp' or 'osqp'",
     )
 
     def __post_init__(self) -> None:
@@ -90,7 +111,12 @@ class MpcSettings:
 class ContactForceSettings(MpcSettings):
     """Settings of the controller with contact forces, sections 2.4.5-2.4.6."""
 
-    force_weight: float = bounded(0.001, low=1e-6, high=1e3, doc="Weight R_u of each contact force")
+    force_weight: float = bounded(
+        0.001,
+        low=1e-6,
+        high=1e3,
+        doc="Weight R_u of each contact force in the cost of the contact-force controller",
+    )
     constraint: bool = bounded(
         True, doc="Whether the pushing constraint (2.53) is active; false for comparison only"
     )
@@ -101,7 +127,8 @@ class TrackerSettings:
     """When a trajectory is done, and when it has gone wrong."""
 
     tracked: Literal["object", "robot"] = bounded(
-        "object", doc="Whether a push steers the object, or the robot as in the thesis"
+        "object",
+        doc="Which pose a push tracks: that of the object, or that of the robot as in the thesis",
     )
     friction_trust: float = bounded(
         0.85, low=0.1, high=1.0, doc="Fraction of the stable curvature that the controller may use"
@@ -143,31 +170,41 @@ class TrackerSettings:
         0.06, low=2e-3, high=1.0, doc="Lag of the robot at which the reference stops (m)"
     )
     contact_gap: float = bounded(
-        0.015, low=1e-3, high=1.0, doc="Gap to the bumper above which contact is in doubt (m)"
+        0.015,
+        low=1e-3,
+        high=1.0,
+        doc="Gap between object and bumper above which contact is in doubt (m)",
     )
     contact_aside: float = bounded(
         0.045,
         low=1e-3,
         high=1.0,
-        doc="Displacement along the bumper above which contact is in doubt (m)",
+        doc="Displacement of the object along the bumper above which contact is in doubt (m)",
     )
     contact_turn: float = bounded(
         0.25,
         low=0.01,
         high=3.2,
-        doc="Rotation relative to the bumper above which contact is in doubt (rad)",
+        doc="Rotation of the object relative to the bumper above which contact is in doubt (rad)",
     )
     contact_time: float = bounded(
-        0.5, low=0.0, high=10.0, doc="Time in doubt after which contact counts as lost (s)"
+        0.5,
+        low=0.0,
+        high=10.0,
+        doc="Time for which contact may be in doubt before it counts as lost (s)",
     )
     off_course: float = bounded(
-        0.08, low=1e-3, high=5.0, doc="Distance from the reference at which a task fails (m)"
+        0.08,
+        low=1e-3,
+        high=5.0,
+        doc="Distance of the robot from its reference at which a task fails (m)",
     )
     deadline: float = bounded(
         0.0,
         low=0.0,
         high=10.0,
-        doc="Wall time that a solve may take in real time (s); 0 disables the check",
+        doc="Wall time that a solve may take in real time (s); a longer one counts as late; 0: "
+        "no limit",
     )
     solver_patience: int = bounded(
         10,
@@ -185,13 +222,14 @@ class TrackerSettings:
         1.5,
         low=0.1,
         high=60.0,
-        doc="Time of commanded motion over which it is judged whether a robot is stuck (s)",
+        doc="Time of commanded motion over which the motion of a robot is judged (s)",
     )
     stuck_way: float = bounded(
         0.03,
         low=1e-3,
         high=1.0,
-        doc="Distance commanded within stuck_time above which it is judged (m)",
+        doc="Distance that must be commanded within stuck_time before a robot can be judged as "
+        "stuck (m)",
     )
     blocked_time: float = bounded(
         4.0,

@@ -15,15 +15,43 @@ from push_model.torque_robot import TorqueRobot
 class FrictionTrustSettings:
     """When a wheel counts as slipping, and what follows."""
 
-    adapt: bool = bounded(True, doc="whether less friction is trusted while a wheel slips")
-    slip: float = bounded(0.05, low=1e-3, high=10.0, doc="[m/s] of a wheel that counts as slip")
-    slip_sigmas: float = bounded(
-        4.0, low=0.0, high=100.0, doc="standard deviations of the estimated speed that slip exceeds"
+    adapt: bool = bounded(
+        True,
+        doc="Whether the trusted fraction of the wheel friction shrinks while a wheel slips, "
+        "and recovers while all wheels roll.",
     )
-    loss_time: float = bounded(0.1, low=1e-3, high=10.0, doc="[s] of slip that halve the trust")
-    regain_time: float = bounded(8.0, low=0.1, high=1e4, doc="[s] of rolling that double it")
+    slip: float = bounded(
+        0.05,
+        low=1e-3,
+        high=10.0,
+        doc="Difference of wheel speed and robot speed above which a wheel counts as slipping "
+        "(m/s).",
+    )
+    slip_sigmas: float = bounded(
+        4.0,
+        low=0.0,
+        high=100.0,
+        doc="Slip counts only above this many standard deviations of the estimated robot speed "
+        "(dimensionless).",
+    )
+    loss_time: float = bounded(
+        0.1,
+        low=1e-3,
+        high=10.0,
+        doc="Time of slip in which the trusted fraction of the wheel friction halves (s).",
+    )
+    regain_time: float = bounded(
+        8.0,
+        low=0.1,
+        high=1e4,
+        doc="Time of rolling in which the trusted fraction of the wheel friction doubles, up "
+        "to its initial value (s).",
+    )
     least: float = bounded(
-        0.3, low=0.01, high=1.0, doc="fraction of the friction that is trusted at least"
+        0.3,
+        low=0.01,
+        high=1.0,
+        doc="Lowest fraction of the wheel friction to which the trust can shrink (dimensionless).",
     )
 
 

@@ -92,7 +92,10 @@ class TorqueFollower:
     def parse(self, request: Any) -> Trajectory:
         """See Follower: a trajectory of the robot alone."""
         if request.mode != FollowTrajectory.Goal.MOVE:
-            raise InvalidMessage("it moves the robot; what it pushes is a disturbance")
+            raise InvalidMessage(
+                "the torque controller accepts only the mode MOVE; an object that is pushed is "
+                "a disturbance"
+            )
         return trajectory_from_ros(request.trajectory)
 
     def begin(self, request: Any, task: Trajectory) -> None:

@@ -34,21 +34,47 @@ class TorqueObserverSettings:
     The process noise of a state is the standard deviation that it gathers in one second.
     """
 
-    position_noise: float = bounded(5e-4, low=1e-6, high=0.1, doc="[m] of a pose")
-    orientation_noise: float = bounded(2e-3, low=1e-6, high=1.0, doc="[rad] of a pose")
-    wheel_noise: float = bounded(0.02, low=1e-4, high=10.0, doc="[m/s] of a wheel that rolls")
-    skid_drift: float = bounded(
-        0.02, low=0.0, high=10.0, doc="[m] process noise of the position: wheels that skid sideways"
+    position_noise: float = bounded(
+        5e-4,
+        low=1e-6,
+        high=0.1,
+        doc="Standard deviation of a measured position that the speed estimate assumes (m).",
     )
-    speed_drift: float = bounded(0.1, low=1e-6, high=100.0, doc="[m/s] process noise of the speed")
+    orientation_noise: float = bounded(
+        2e-3,
+        low=1e-6,
+        high=1.0,
+        doc="Standard deviation of a measured heading that the speed estimate assumes (rad).",
+    )
+    wheel_noise: float = bounded(
+        0.02,
+        low=1e-4,
+        high=10.0,
+        doc="Standard deviation of the speed of a wheel that rolls (m/s).",
+    )
+    skid_drift: float = bounded(
+        0.02,
+        low=0.0,
+        high=10.0,
+        doc="Process noise of the estimated position, for wheels that skid sideways (m).",
+    )
+    speed_drift: float = bounded(
+        0.1, low=1e-6, high=100.0, doc="Process noise of the estimated speed (m/s)."
+    )
     turn_drift: float = bounded(
-        0.5, low=1e-6, high=1000.0, doc="[rad/s] process noise of the turn rate"
+        0.5, low=1e-6, high=1000.0, doc="Process noise of the estimated turn rate (rad/s)."
     )
     drag_drift: float = bounded(
-        5.0, low=0.0, high=1e4, doc="[N] process noise of the drag; 0: no drag is estimated"
+        5.0,
+        low=0.0,
+        high=1e4,
+        doc="Process noise of the estimated drag of a load (N); 0: no drag is estimated.",
     )
     moment_drift: float = bounded(
-        1.0, low=0.0, high=1e4, doc="[Nm] process noise of the moment; 0: no moment is estimated"
+        1.0,
+        low=0.0,
+        high=1e4,
+        doc="Process noise of the estimated yaw moment of a load (Nm); 0: no moment is estimated.",
     )
 
 

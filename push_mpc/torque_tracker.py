@@ -27,13 +27,37 @@ _NONE: Torques = (0.0, 0.0)
 class TorqueTrackerSettings:
     """When a trajectory is done, and when it has gone wrong."""
 
-    pose_delay: float = bounded(0.0, low=0.0, high=1.0, doc="[s] latency of the pose stream")
-    settle_time: float = bounded(2.0, low=0.0, high=60.0, doc="[s] after the trajectory's end")
-    position_tolerance: float = bounded(0.1, low=1e-3, high=5.0, doc="[m] at the end")
-    orientation_tolerance: float = bounded(0.2, low=1e-3, high=3.2, doc="[rad] at the end")
-    off_course: float = bounded(1.5, low=0.01, high=50.0, doc="[m] from the reference")
-    solver_patience: int = bounded(10, low=1, high=10000, doc="failed solves in a row")
-    give_up: float = bounded(5.0, low=0.1, high=600.0, doc="[s] without poses until given up")
+    pose_delay: float = bounded(
+        0.0, low=0.0, high=1.0, doc="Latency of the pose stream that is compensated (s)."
+    )
+    settle_time: float = bounded(
+        2.0,
+        low=0.0,
+        high=60.0,
+        doc="Time after the end of the trajectory in which the robot must reach the tolerances "
+        "(s).",
+    )
+    position_tolerance: float = bounded(
+        0.1,
+        low=1e-3,
+        high=5.0,
+        doc="Position error that is allowed at the end of the trajectory (m).",
+    )
+    orientation_tolerance: float = bounded(
+        0.2,
+        low=1e-3,
+        high=3.2,
+        doc="Heading error that is allowed at the end of the trajectory (rad).",
+    )
+    off_course: float = bounded(
+        1.5, low=0.01, high=50.0, doc="Distance from the reference at which the task fails (m)."
+    )
+    solver_patience: int = bounded(
+        10, low=1, high=10000, doc="Number of failed solves in a row after which the task fails."
+    )
+    give_up: float = bounded(
+        5.0, low=0.1, high=600.0, doc="Time without poses after which the task fails (s)."
+    )
 
 
 @dataclass(frozen=True)
@@ -132,7 +156,9 @@ class TorqueTracker:
             return self._ended(TrackError.OFF_COURSE, _away(off), error, progress)
         if self._time > trajectory.duration + s.settle_time:
             if off > s.position_tolerance or turned > s.orientation_tolerance:
-                why = f"ended {1e3 * off:.0f} mm and {turned:.2f} rad off"
+                why = (
+                    f"the trajectory ended with an error of {1e3 * off:.0f} mm and {turned:.2f} rad"
+                )
                 return self._ended(TrackError.TIMEOUT, why, error, progress)
             return self._ended(TrackError.NONE, "", error, progress)
         self.controller.trusted = self._friction
@@ -213,4 +239,4 @@ class TorqueTracker:
 
 
 def _away(off: float) -> str:
-    return f"{1e3 * off:.0f} mm from the reference"
+    return f"the robot is {1e3 * off:.0f} mm from its reference"

@@ -38,7 +38,7 @@ class WheelFeed:
             if stamp > self._kept[-1][0] and frozen.any():
                 return "a wheel that turns stays at its angle: the states are frozen"
         if self._kept and stamp < self._kept[-1][0]:
-            self._kept.clear()  # the clock went back
+            self._kept.clear()  # the clock jumped back
         self._kept.append((stamp, speeds))
         while stamp - self._kept[0][0] > _KEPT:
             self._kept.popleft()

@@ -25,27 +25,71 @@ from push_mpc.torque_sqp import SOLVED, WORDS, minimise, worst
 class WheelSlipSettings:
     """Names and values of section 2.3.4."""
 
-    step: float = bounded(0.1, low=0.01, high=1.0, doc="[s] T_s")
-    horizon: int = bounded(15, low=2, high=100, doc="N, steps predicted")
-    control_horizon: int = bounded(6, low=1, high=100, doc="M, steps with torques of their own")
+    step: float = bounded(0.1, low=0.01, high=1.0, doc="Length T_s of a predicted step (s).")
+    horizon: int = bounded(15, low=2, high=100, doc="Number N of predicted steps.")
+    control_horizon: int = bounded(
+        6,
+        low=1,
+        high=100,
+        doc="Number M of first steps with torques of their own; later steps repeat the last "
+        "torques.",
+    )
     state_weight: tuple[float, float, float, float, float] = (2.5, 5.0, 0.25, 0.05, 0.05)
-    terminal_factor: float = bounded(4.0, low=0.0, high=1000.0, doc="P = factor * Q")
-    friction: float = bounded(0.5, low=0.01, high=3.0, doc="mu of the wheels that is believed")
+    terminal_factor: float = bounded(
+        4.0,
+        low=0.0,
+        high=1000.0,
+        doc="Factor of the terminal weight, P = factor * Q (dimensionless).",
+    )
+    friction: float = bounded(
+        0.5,
+        low=0.01,
+        high=3.0,
+        doc="Assumed friction coefficient mu of wheels and floor (dimensionless).",
+    )
     friction_trust: float = bounded(
-        0.9, low=0.1, high=1.0, doc="fraction of that friction that wheels may ask for"
+        0.9,
+        low=0.1,
+        high=1.0,
+        doc="Fraction of the assumed wheel friction that the controller may use (dimensionless).",
     )
     sideways_share: float = bounded(
         0.5,
         low=0.5,
         high=1.0,
-        doc="of the sideways traction of both wheels that either is taken to bear; 1: as printed",
+        doc="Fraction of the sideways force of the robot that each wheel is assumed to bear; "
+        "1: as printed in the thesis (dimensionless).",
     )
-    constraint: bool = bounded(True, doc="whether (2.31)-(2.33) are asked for")
-    position_limit: float = bounded(10.0, low=0.1, high=1e4, doc="[m] x_lim, y_lim")
-    penalty: float = bounded(100.0, low=0.1, high=1e6, doc="rho of the greatest violation")
-    penalty_square: float = bounded(1000.0, low=1e-3, high=1e8, doc="rho_2 of its square")
-    iterations: int = bounded(100, low=1, high=1000, doc="quadratic programmes of a solve at most")
-    tolerance: float = bounded(1e-3, low=1e-8, high=1.0, doc="[Nm] of the last step")
+    constraint: bool = bounded(
+        True, doc="Whether the wheel-slip constraint (2.31)-(2.33) is active."
+    )
+    position_limit: float = bounded(
+        10.0,
+        low=0.1,
+        high=1e4,
+        doc="Largest absolute x and y that the constraint (2.19) allows (m).",
+    )
+    penalty: float = bounded(
+        100.0, low=0.1, high=1e6, doc="Linear penalty rho of the largest constraint violation."
+    )
+    penalty_square: float = bounded(
+        1000.0,
+        low=1e-3,
+        high=1e8,
+        doc="Quadratic penalty rho_2 of the largest constraint violation.",
+    )
+    iterations: int = bounded(
+        100,
+        low=1,
+        high=1000,
+        doc="Maximum number of quadratic programmes that one solve of the NMPC takes.",
+    )
+    tolerance: float = bounded(
+        1e-3,
+        low=1e-8,
+        high=1.0,
+        doc="Change of the torques below which the iterations of a solve end (Nm).",
+    )
 
     def __post_init__(self) -> None:
         if self.control_horizon > self.horizon:

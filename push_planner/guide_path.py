@@ -4,9 +4,9 @@
 add up to it. The sweep below asks RRT* for the shortest path at several least clearances and takes
 the best by (2.1), which is exact in the limit of many thresholds.
 
-Which clearances there are to ask for is not left to chance: the widest way over the lattice of the
-distance field says how wide a path can be, and whether there is one. Where samples miss a way that
-is known to be there, or find one that is much longer, that way itself is the guide.
+The widest path over the lattice of the distance field gives the largest clearance to ask for, and
+tells whether there is a path at all. If RRT* finds no path, or a much longer one than the lattice
+search, the path of the lattice search is the guide path.
 """
 
 import math

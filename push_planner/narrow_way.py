@@ -1,10 +1,10 @@
 """Object poses that are lined up with the narrow parts of a guide path.
 
-Where a way is little wider than the object, a push goes through it only from a pose that fits to a
-millimetre and a degree: poses at random, or turned as the guide path is, do not. Here each narrow
-stretch of the path gets a straight line, moved and turned until a straight push along it keeps the
-greatest clearance, for each side that may be pushed. Poses are set on that line, in front of the
-stretch, behind it, and where the lines of two stretches meet.
+Where the free space is little wider than the object, a push passes only if its start pose is right
+to about a millimetre and a degree. Random poses and poses along the guide path are not. For each
+narrow stretch and each side, a straight line is shifted and turned until a straight push along it
+has the greatest clearance. Candidate poses are placed on this line, before and behind the stretch,
+and where the lines of two stretches meet.
 """
 
 import math

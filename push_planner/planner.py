@@ -305,7 +305,8 @@ class PushPlanner:
         except NoGuidePath as error:
             if error.widest == 0.0:
                 raise PlanningFailed(
-                    PlanError.NO_GUIDE_PATH, "obstacles part start and goal: no way connects them"
+                    PlanError.NO_GUIDE_PATH,
+                    "obstacles separate start and goal: no way connects them",
                 ) from None
             raise PlanningFailed(
                 PlanError.NO_GUIDE_PATH,

@@ -1,7 +1,7 @@
 """Pushes to try when no plan was found: section 2.5, state S2.
 
-The thesis draws one random curvature; here a few are drawn, straight included, and every side and
-length is tried, so that the list is not empty by bad luck.
+The thesis draws one random curvature. Here several curvatures are drawn, a straight push is added,
+and every side and length is tried. The result thus depends less on the random draw.
 """
 
 from collections.abc import Iterator

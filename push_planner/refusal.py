@@ -55,9 +55,9 @@ def check_room(scene: PushScene, pose: Array, what: str, leaving: bool = False) 
         around = 1e3 * scene.robot_keeps(needed)
         raise PlanningFailed(
             PlanError.NO_PUSH_SEQUENCE,
-            f"no side of the object can be {what} {_told(pose)}: behind each that can be pushed "
-            f"the robot, which needs {around:.1f} mm around it and some way to back off, would "
-            f"touch an obstacle: sides {behind}",
+            f"no side of the object can be {what} {_told(pose)}: the robot needs {around:.1f} mm "
+            "around it and room to back off, and would touch an obstacle behind each side that "
+            f"can be pushed: sides {behind}",
         )
 
 
@@ -75,7 +75,7 @@ def why_not(
     ways: whether any push was found that leaves the start, and any that ends at the goal. poses:
     how many of the object were tried. widest: [m] clearance of the widest guide path found.
     """
-    tried = f"of {statistics.solved} pushes tried, {statistics.feasible} touch nothing"
+    tried = f"of {statistics.solved} pushes tried, {statistics.feasible} are free of collisions"
     for found, pose, what in (
         (ways[0], start, "away from the start"),
         (ways[1], goal, "to the goal"),

@@ -77,7 +77,7 @@ def plan_robot_path(
     if not len(way):
         raise NoRobotPath(
             RobotPathError.NO_PATH,
-            "no way for the robot between start and goal: it needs "
+            "no path of the robot connects start and goal: it needs a passage of "
             f"{2.0 * (robot.footprint_radius + settings.safety_distance):.3f} m",
         )
     points = np.vstack([start[:2], way[1:-1] * field.spacing + field.args[:2], goal[:2]])

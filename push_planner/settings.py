@@ -12,13 +12,21 @@ class PlannerSettings:
 
     planner: Literal["lazy", "thesis"] = bounded(
         "lazy",
-        doc="Layer 2: lazy A* with improvements, or Algorithms 1 and 2 of the thesis as printed",
+        doc="Search for the push sequence (layer 2): 'lazy' (lazy A* with improvements), or "
+        "'thesis' (Algorithms 1 and 2 as printed)",
     )
     length_weight: float = bounded(
-        1.0, low=0.0, high=100.0, doc="Weight lambda_1 of the path length in (2.1)"
+        1.0,
+        low=0.0,
+        high=100.0,
+        doc="Weight lambda_1 of the path length in the cost (2.1) of the guide path "
+        "(dimensionless)",
     )
     clearance_weight: float = bounded(
-        0.05, low=0.0, high=100.0, doc="Weight lambda_2 of the inverse clearance in (2.1) (m^2)"
+        0.05,
+        low=0.0,
+        high=100.0,
+        doc="Weight lambda_2 of the inverse clearance in the cost (2.1) of the guide path (m^2)",
     )
     clearance_levels: int = bounded(
         4, low=1, high=20, doc="Number of minimum clearances for which a guide path is searched"
@@ -27,68 +35,94 @@ class PlannerSettings:
         1200, low=50, high=200000, doc="RRT* iterations for each minimum clearance"
     )
     rrt_range: float = bounded(
-        0.3, low=0.02, high=5.0, doc="Longest extension of the RRT* tree (m)"
+        0.3, low=0.02, high=5.0, doc="Longest extension of the RRT* tree in one iteration (m)"
     )
     waypoint_spacing: float = bounded(
         0.3, low=0.02, high=5.0, doc="Distance between waypoints on the guide path (m)"
     )
     heading_offsets: tuple[float, ...] = bounded(
-        (0.0, 0.5, -0.5, 1.0, -1.0), doc="Headings tried at a waypoint, relative to the path (rad)"
+        (0.0, 0.5, -0.5, 1.0, -1.0),
+        doc="Headings of the object that are tried at a waypoint, relative to the guide path (rad)",
     )
     lateral_offsets: tuple[float, ...] = bounded(
         (0.0, 0.25, -0.25, 0.5, -0.5),
-        doc="Lateral positions tried at a waypoint, relative to the path (m)",
+        doc="Lateral positions of the object that are tried at a waypoint, relative to the "
+        "guide path (m)",
     )
     run_lengths: tuple[float, ...] = bounded(
-        (0.15, 0.3, 0.6), doc="Lengths of runs out of the start and into the goal (m)"
+        (0.15, 0.3, 0.6),
+        doc="Lengths of pushes out of the start and into the goal whose ends are tried as "
+        "poses of the object (m)",
     )
     scattered_poses: tuple[int, ...] = bounded(
-        (0, 300, 1000), doc="Random poses near the guide path that are added in each search"
+        (0, 300, 1000),
+        doc="Numbers of random object poses near the guide path, one for each search until a "
+        "plan is found",
     )
     manoeuvres: int = bounded(
         150,
         low=0,
         high=100000,
-        doc="Poses two pushes away from start and goal that each further search adds",
+        doc="Number of object poses two pushes away from start and from goal that each further "
+        "search adds",
     )
     heuristic_weight: float = bounded(
         3.0,
         low=1.0,
         high=100.0,
-        doc="Weight of the estimated cost-to-go, used if a search with weight 1 does not finish",
+        doc="Weight of the estimated cost-to-go, used if a search with weight 1 does not "
+        "finish (dimensionless)",
     )
     max_expansions: int = bounded(
-        1200, low=1, high=10000000, doc="Maximum number of pushes evaluated in one search"
+        1200, low=1, high=10000000, doc="Maximum number of pushes that one search evaluates"
     )
     total_expansions: int = bounded(
         7200,
         low=1,
         high=10000000,
-        doc="Maximum number of pushes evaluated until a first plan is found",
+        doc="Maximum number of pushes that are evaluated until a first plan is found",
     )
     improvement_expansions: int = bounded(
-        1500, low=0, high=10000000, doc="Maximum number of pushes evaluated after the first plan"
+        1500,
+        low=0,
+        high=10000000,
+        doc="Maximum number of pushes that are evaluated after the first plan, to lower its cost",
     )
     improvement_poses: int = bounded(
-        600, low=0, high=100000, doc="Scattered poses that the first improvement adds"
+        600,
+        low=0,
+        high=100000,
+        doc="Number of random object poses that the first search after the first plan adds",
     )
     refinement: float = bounded(
         0.15,
         low=0.001,
         high=2.0,
-        doc="Distance by which improvement rounds move poses (m); halved every two rounds",
+        doc="Distance by which searches after the first plan move the poses of the best plan "
+        "(m); halved every two rounds",
     )
     push_cost: float = bounded(
-        0.05, low=0.0, high=10.0, doc="Path length that each push costs in addition to its own (m)"
+        0.05, low=0.0, high=10.0, doc="Cost of each push in addition to its length (m)"
     )
     side_change_cost: float = bounded(
-        0.3, low=0.0, high=10.0, doc="Path length that a change of the pushed side costs (m)"
+        0.3,
+        low=0.0,
+        high=10.0,
+        doc="Cost of each change of the pushed side, in addition to the distance between the "
+        "robot poses (m)",
     )
     friction_trust: float = bounded(
-        0.75, low=0.1, high=1.0, doc="Fraction of the stable curvature that plans may use"
+        0.75,
+        low=0.1,
+        high=1.0,
+        doc="Fraction of the stable curvature that plans may use; the rest is a margin for "
+        "lower friction (dimensionless)",
     )
     safety_distance: float = bounded(
-        0.012, low=0.0, high=1.0, doc="Clearance of robot and object to obstacles (m)"
+        0.012,
+        low=0.0,
+        high=1.0,
+        doc="Least clearance of robot and object to obstacles in a plan (m)",
     )
     standoff: float = bounded(
         0.06,
@@ -96,27 +130,42 @@ class PlannerSettings:
         high=2.0,
         doc="Distance behind the contact from which a robot approaches the object (m)",
     )
-    push_speed: float = bounded(0.07, low=0.005, high=2.0, doc="Speed of a push (m/s)")
+    push_speed: float = bounded(
+        0.07, low=0.005, high=2.0, doc="Speed of the robot during a push (m/s)"
+    )
     push_acceleration: float = bounded(
-        0.05, low=0.005, high=5.0, doc="Acceleration of a push (m/s^2)"
+        0.05, low=0.005, high=5.0, doc="Acceleration of the robot during a push (m/s^2)"
     )
     move_speed: float = bounded(
-        0.1, low=0.005, high=2.0, doc="Speed of the robot without object (m/s)"
+        0.1, low=0.005, high=2.0, doc="Speed of the robot between two pushes (m/s)"
     )
     move_acceleration: float = bounded(
-        0.15, low=0.005, high=5.0, doc="Acceleration of the robot without object (m/s^2)"
+        0.15, low=0.005, high=5.0, doc="Acceleration of the robot between two pushes (m/s^2)"
     )
-    turn_rate: float = bounded(1.5, low=0.05, high=10.0, doc="Speed of turns in place (rad/s)")
+    turn_rate: float = bounded(
+        1.5,
+        low=0.05,
+        high=10.0,
+        doc="Turn rate of the robot when it turns in place between two pushes (rad/s)",
+    )
     turn_acceleration: float = bounded(
-        3.0, low=0.05, high=50.0, doc="Acceleration of turns in place (rad/s^2)"
+        3.0,
+        low=0.05,
+        high=50.0,
+        doc="Angular acceleration of the robot when it turns in place between two pushes (rad/s^2)",
     )
     improvement_rounds: int = bounded(
-        20, low=0, high=50, doc="Number of improvement searches after the first plan"
+        20, low=0, high=50, doc="Maximum number of searches after the first plan, to lower its cost"
     )
     max_preemptive: int = bounded(
         8, low=0, high=100, doc="Maximum number of pre-emptive pushes that are tried"
     )
-    seed: int = bounded(1, low=1, high=2**31, doc="Seed of the RRT*")
+    seed: int = bounded(
+        1,
+        low=1,
+        high=2**31,
+        doc="Seed of the random numbers of the planner (RRT* and random poses)",
+    )
 
     def __post_init__(self) -> None:
         if self.length_weight == 0.0 and self.clearance_weight == 0.0:

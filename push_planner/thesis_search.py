@@ -1,6 +1,6 @@
-"""Layer 2 as the thesis prints it: Algorithms 1 and 2, without what was added since.
+"""Layer 2 as the thesis prints it: Algorithms 1 and 2, without the additions of this project.
 
-For comparison, and to see plans fail that the default search finds. The first plan is the only one.
+It serves for comparison: it misses plans that the default search finds. It returns its first plan.
 """
 
 import heapq

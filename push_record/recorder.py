@@ -34,7 +34,8 @@ def heard_scenario(namespace: str = "", limit: float | None = None) -> Scenario:
     message = hear_latched(String, topic, _PATIENCE if limit is None else limit)
     if message is None:
         raise SettingsError(
-            f"nobody publishes a scenario on {topic}; start a suite, or name it with --scenario"
+            f"no node publishes a scenario on {topic}; start a suite, or give the scenario "
+            "by --scenario"
         )
     return scenario_from_text(str(message.data), "scenario", topic)
 

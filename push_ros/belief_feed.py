@@ -63,6 +63,6 @@ class BeliefFeed:
         if belief == self.current:
             return
         self.current = belief
-        self._node.get_logger().info(f"belief of {message.source} taken up")
+        self._node.get_logger().info(f"the belief of '{message.source}' is used from now on")
         if self._changed is not None:
             self._changed(belief)

@@ -198,7 +198,7 @@ def grid_from_ros(message: GridMessage) -> OccupancyGrid:
     if rows < 3 or columns < 3 or data.size != rows * columns:
         raise InvalidMessage(f"a map of {rows} x {columns} cells with {data.size} values")
     if not 1e-3 <= info.resolution <= 10.0:
-        raise InvalidMessage(f"a map with a resolution of {info.resolution} m")
+        raise InvalidMessage(f"a map needs a positive resolution, got {info.resolution} m")
     q = info.origin.orientation
     finite((info.origin.position.x, info.origin.position.y, q.z, q.w), "the map's origin")
     if abs(se2.yaw_from_quaternion(q.x, q.y, q.z, q.w)) > 1e-6:

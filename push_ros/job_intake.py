@@ -205,7 +205,7 @@ class JobIntake:
     def reset(self) -> None:
         """The clock has gone back."""
         if self._keeper.pending is not None:
-            self._drop(GoalRefused(JobError.CLOCK_RESET, "the clock went back"))
+            self._drop(GoalRefused(JobError.CLOCK_RESET, "the clock jumped back"))
 
     def wait(self, now: float) -> None:
         """Tell the time [s] on the clock for silence, while no frame comes too."""
@@ -287,7 +287,11 @@ class JobIntake:
         why = "a new goal replaces this one"
         if same:  # whoever waited for it waits no longer; the job goes on
             code = int(JobError.PREEMPTED)
-            self.finish(MoveObject.Result(error_code=code, error_msg="somebody else takes over"))
+            self.finish(
+                MoveObject.Result(
+                    error_code=code, error_msg="another client has taken over the job"
+                )
+            )
         elif self._owner.busy or self._owner.plan_ready:
             self._owner.end_job(JobError.PREEMPTED, why)
 

@@ -189,7 +189,7 @@ class MethodNode(Node):
         """See JobOwner."""
         self.take_task(self._task(goal))
         if plan_only:
-            text = f"the method '{self.spec.name}' plans as it goes; it makes no plan that waits"
+            text = f"the method '{self.spec.name}' plans one step at a time; leave plan_only unset"
             self.end_job(JobError.INVALID_GOAL, text)
 
     def _task(self, goal: Array) -> Task:
@@ -259,9 +259,9 @@ class MethodNode(Node):
             self._reported = -math.inf
             if self.method is not None:
                 self.method.revive()
-            self._door.drop(JobError.CLOCK_RESET, "the clock went back")
+            self._door.drop(JobError.CLOCK_RESET, "the clock jumped back")
             self._intake.reset()
-            self.end_job(JobError.CLOCK_RESET, "the clock went back")
+            self.end_job(JobError.CLOCK_RESET, "the clock jumped back")
         elif frame.verdict is not Stamp.REFUSED:
             told = self._step(frame)
         self._commander.send(self._stamp, told)

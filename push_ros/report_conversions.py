@@ -49,7 +49,7 @@ def report_from_ros(message: ReportMessage) -> Report:
     points = np.column_stack([np.asarray(message.x), np.asarray(message.y)])
     ends = np.cumsum([0, *message.counts])
     if len(message.x) != len(message.y) or ends[-1] != len(points):
-        raise InvalidMessage("a report's shapes have another number of points than it says")
+        raise InvalidMessage("a report has another number of points than its shapes need")
     try:
         kinds = [ShapeKind(int(k)) for k in message.kinds]
     except ValueError as error:
@@ -99,7 +99,7 @@ def belief_from_ros(message: BeliefMessage, base: Belief) -> Belief:
     if len({len(c) for c in columns}) != 1:
         raise InvalidMessage("a belief's arrays must have the same length")
     if not message.source:
-        raise InvalidMessage("a belief needs its source")
+        raise InvalidMessage("a belief needs a source: set the field 'source'")
     try:
         values = {
             (str(b), str(q)): Interval(float(v), float(low), float(high))
@@ -113,7 +113,7 @@ def belief_from_ros(message: BeliefMessage, base: Belief) -> Belief:
 
 def _outline(message: BelievedOutline) -> Array:
     if len(message.x) != len(message.y):
-        raise InvalidMessage(f"the outline of '{message.body}' has more x than y, or fewer")
+        raise InvalidMessage(f"the outline of '{message.body}' needs as many x as y")
     return np.column_stack([np.asarray(message.x), np.asarray(message.y)])
 
 

@@ -20,10 +20,17 @@ class GridPlacement:
     """In rows, from the lowest upward."""
 
     kind: Literal["grid"] = field(default="grid", kw_only=True)
-    corner: tuple[float, float] = bounded(low=-1e4, high=1e4, doc="Position of the first body (m)")
-    spacing: float = bounded(low=1e-3, high=100.0, doc="Distance between neighbours (m)")
+    corner: tuple[float, float] = bounded(
+        low=-1e4, high=1e4, doc="Position x, y of the first body of the grid (m)"
+    )
+    spacing: float = bounded(
+        low=1e-3, high=100.0, doc="Distance between neighbours in the grid (m)"
+    )
     columns: int | None = bounded(
-        None, low=1, high=10000, doc="Bodies in a row; default: a square grid"
+        None,
+        low=1,
+        high=10000,
+        doc="Number of bodies in a row of the grid; default: as many as there are rows",
     )
     heading: float = bounded(0.0, low=-10.0, high=10.0, doc="Heading of all bodies (rad)")
 
@@ -46,7 +53,7 @@ class RingPlacement:
     radius: float = bounded(low=1e-3, high=1000.0, doc="Radius of the ring (m)")
     first: float = bounded(0.0, low=-10.0, high=10.0, doc="Polar angle of the first body (rad)")
     facing: Literal["inward", "outward", "along"] = bounded(
-        "inward", doc="Direction in which the bodies face"
+        "inward", doc="Direction in which the bodies on the ring face"
     )
 
     def poses(self, count: int, radius: float, room: Room, taken: Array) -> Array:
@@ -74,7 +81,9 @@ class RandomPlacement:
         high=1e4,
         doc="Rectangle x_min, x_max, y_min, y_max (m); default: the whole arena",
     )
-    gap: float = bounded(0.01, low=0.0, high=10.0, doc="Least distance to anything else (m)")
+    gap: float = bounded(
+        0.01, low=0.0, high=10.0, doc="Least gap between a body and any other body or wall (m)"
+    )
     heading: float | None = bounded(
         None, low=-10.0, high=10.0, doc="Heading of all bodies (rad); default: random"
     )
@@ -115,7 +124,7 @@ class RandomPlacement:
             else:
                 raise SettingsError(
                     f"no room found for number {i + 1} of {count} in {_TRIES} tries; "
-                    "expected a larger area, a smaller gap or fewer"
+                    "enlarge 'area', or reduce 'gap' or 'count'"
                 )
             poses[i] = x, y, theta if self.heading is None else self.heading
             circles[len(taken) + i] = x, y, radius

@@ -178,10 +178,10 @@ def _claim(out: Path, study: dict[str, Any]) -> None:
                 )
         return
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise FileExistsError(f"{out} is there already, and no study; choose another --out")
+        raise FileExistsError(f"{out} exists already and is not a study; choose another --out")
     out.mkdir(parents=True, exist_ok=True)
     if not os.access(out, os.W_OK):
-        raise SettingsError(f"{out}: nothing can be written there")
+        raise SettingsError(f"{out}: this folder cannot be written")
     mark.write_text(json.dumps(study, indent=1) + "\n")
 
 
@@ -193,7 +193,8 @@ def _alone(out: Path) -> Iterator[None]:
             fcntl.flock(mark, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
             raise FileExistsError(
-                f"another process is at the study in {out}; wait for it, or choose another --out"
+                f"another process writes to the study in {out}; wait for it, or choose "
+                "another --out"
             ) from error
         yield
 

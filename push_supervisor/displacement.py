@@ -31,5 +31,5 @@ class Displacement:
         if self._count < _LOOKS:
             return None
         self._count = 0
-        text = f"the object stands {1e3 * way:.0f} mm and {turn:.2f} rad from where the "
-        return ObjectMoved(text + "push was to begin")
+        text = f"the object is {1e3 * way:.0f} mm and {turn:.2f} rad from the planned "
+        return ObjectMoved(text + "start of the push")

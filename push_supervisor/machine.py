@@ -96,7 +96,7 @@ class Machine:
             case events.CancelCommanded():
                 self._abort(JobError.CANCELED, "canceled")
             case events.ClockReset():
-                self._abort(JobError.CLOCK_RESET, "the clock went back")
+                self._abort(JobError.CLOCK_RESET, "the clock jumped back")
             case events.JobAborted():
                 self._abort(event.code, event.message)
             case events.MapChanged():
@@ -198,7 +198,7 @@ class Machine:
         if event.retry and not self._preemptive:
             self._ask_plan(f"{message}; looking for a pre-emptive push", preemptive=True)
         elif event.crowded and self._may_wait():
-            self._ask_plan(f"{message}; waiting for others to make way", later=True)
+            self._ask_plan(f"{message}; waiting for other bodies to make way", later=True)
         else:
             self._finish(event.code, message)
 
@@ -225,14 +225,14 @@ class Machine:
         self._say(commands.FollowPath(event.trajectory))
 
     def _on_path_failed(self, event: events.PathFailed) -> None:
-        why = f"no way to side {self.segment.side}: {event.message}"
+        why = f"no path to side {self.segment.side}: {event.message}"
         self._retry(why, move_away=True, crowded=event.crowded)
 
     def _retry(self, message: str, move_away: bool, crowded: bool = False) -> None:
         """Another try at positioning; the robot first backs off when that may help."""
         self._retries += 1
         if self._retries > self.settings.max_retries and crowded and self._may_wait():
-            self._position(f"{message}; waiting for others to make way", later=True)
+            self._position(f"{message}; waiting for other bodies to make way", later=True)
         elif self._retries > self.settings.max_retries:
             self._say(commands.Stop())
             self._finish(JobError.POSITIONING_FAILED, message)
@@ -287,13 +287,13 @@ class Machine:
             return
         self.index += 1
         if self.index < len(self.segments):
-            self._position("on to the next side")
+            self._position("driving to the next side")
             return
         there, error = self.at_goal(self.goal)
         if there:
             self._finish(JobError.NONE, f"the goal is reached: {error}")
         else:
-            why = f"the object is off its goal: {error}"
+            why = f"the object is outside the tolerances of the goal: {error}"
             self._replan(why, JobError.OFF_TARGET, backed_off=True)
 
     def _note_progress(self, left: int) -> None:
@@ -313,7 +313,7 @@ class Machine:
 
     def _plan_anew(self, why: str, backed_off: bool = False) -> None:
         self.replans += 1
-        self._plan(f"planning anew: {why}", backed_off)
+        self._plan(f"making a new plan: {why}", backed_off)
 
     def _give_up(self, code: JobError, message: str) -> None:
         self._say(commands.Stop())
@@ -350,7 +350,7 @@ class Machine:
         """Somebody moved the object: the job begins anew from there."""
         self._moves += 1
         if self._moves > self.settings.max_replans:
-            text = f"{message}; it was moved {self._moves} times without a push in between"
+            text = f"{message}; it was moved {self._moves} times before a push was completed"
             self._give_up(JobError.OBJECT_MOVED, text)
             return
         self._say(commands.Stop())
@@ -364,7 +364,7 @@ class Machine:
                 self._say(commands.Stop())
                 self._position("the map has changed")
         elif self.plan_ready:
-            self._plan(f"planning anew: {problem}")
+            self._plan(f"making a new plan: {problem}")
         elif self.state is State.DETACHING:
             self._recovering, self._backing_off = self._recovering or problem, ""
         elif self.state is State.PUSHING:

@@ -137,7 +137,7 @@ class SupervisorNode(Node):
         if self._world is not None:
             for name, body in zip((self.robot, self.object), self._world, strict=True):
                 if body is None:
-                    text = f"there is no '{name}' in the world"
+                    text = f"no body '{name}' in the world; use a name of the scenario"
                     raise GoalRefused(JobError.UNKNOWN_OBJECT, text)
         self.surroundings.check_goal(goal)
 
@@ -182,7 +182,7 @@ class SupervisorNode(Node):
         if before is not None and before != now:
             gone = [n for n, b in zip((self.robot, self.object), now, strict=True) if b is None]
             what = f"without {' and '.join(gone)}" if gone else "with another robot or object"
-            self.end_job(JobError.UNKNOWN_OBJECT, f"the world is a new one, {what}")
+            self.end_job(JobError.UNKNOWN_OBJECT, f"another scenario was loaded, {what}")
 
     def _on_frame(self, frame: Frame) -> None:
         """Frames come every 50 ms."""

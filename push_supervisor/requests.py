@@ -26,7 +26,7 @@ class Peer(Enum):
     """Who can be asked."""
 
     PLANNER = "the planner"
-    PATHS = "the planner of the robot's way"
+    PATHS = "the planner of robot paths"
     CONTROLLER = "the controller"
 
 
@@ -135,7 +135,9 @@ class Requests:
         peer = self.request.peer
         self.drop()
         if now.poses:
-            return Verdict(Step.GIVE_UP, JobError.NODE_LOST, f"{peer.value} is not there")
+            return Verdict(
+                Step.GIVE_UP, JobError.NODE_LOST, f"{peer.value} is not in the ROS graph"
+            )
         return Verdict(Step.GIVE_UP, JobError.POSES_STALE, "no poses of robot and object")
 
     def sign(self, number: int, now: Moment) -> None:

@@ -40,39 +40,46 @@ class SupervisorSettings:
         4,
         low=0,
         high=100,
-        doc="Largest number of new plans in a row without progress. Progress is a push that leaves "
-        "fewer pushes to do than before. It also bounds how often somebody may move the object "
-        "before another push is completed.",
+        doc="Maximum number of new plans in a row without progress. A push makes progress if "
+        "fewer pushes are left after it than before. The same number limits how often the "
+        "object may be displaced by others before a push is completed.",
     )
     max_retries: int = bounded(
         2,
         low=0,
         high=100,
-        doc="Further attempts in a row to position the robot at a side of the object.",
+        doc="Number of further attempts in a row to position the robot at a side of the object.",
     )
     max_losses: int = bounded(
         40,
         low=0,
         high=10000,
-        doc="Times in a row that the controller node may be lost until the job ends.",
+        doc="Number of times in a row that the controller node may be lost before the job fails.",
     )
     max_waits: int = bounded(
-        10, low=0, high=10000, doc="Waits in a row for other bodies to make way."
+        10,
+        low=0,
+        high=10000,
+        doc="Maximum number of waits in a row for other bodies to clear the way of the robot.",
     )
     wait: float = bounded(
         3.0,
         low=0.1,
         high=600.0,
-        doc="Duration of one wait for other bodies to make way, in the time of the poses (s).",
+        doc="Duration of one wait for other bodies to clear the way, in pose time (s).",
     )
     approach_speed: float = bounded(
-        0.04, low=1e-3, high=2.0, doc="Speed of the robot to contact and back (m/s)."
+        0.04,
+        low=1e-3,
+        high=2.0,
+        doc="Speed of the robot when it approaches the object and backs off from it (m/s).",
     )
     acceleration: float = bounded(
         0.1,
         low=1e-3,
         high=10.0,
-        doc="Acceleration of the robot on its way to contact and back (m/s^2).",
+        doc="Acceleration of the robot when it approaches the object and backs off from it "
+        "(m/s^2).",
     )
     detach_distance: float = bounded(
         0.06, low=5e-3, high=2.0, doc="Distance that the robot backs off after a push (m)."
@@ -93,27 +100,28 @@ class SupervisorSettings:
         1.0,
         low=0.2,
         high=60.0,
-        doc="Time without feedback of the controller after which it counts as lost (s). It must "
-        "pass by the poses and by the wall clock; in lockstep by the poses alone.",
+        doc="Time without feedback of the controller after which it counts as lost (s). In "
+        "real time, both pose time and wall time must exceed it; in lockstep only pose "
+        "time.",
     )
     node_timeout: float = bounded(
         20.0,
         low=0.5,
         high=600.0,
-        doc="Time to wait for a node that is not in the graph (s). Wall time; in lockstep the time "
-        "of the poses.",
+        doc="Time to wait for a node that is not in the ROS graph (s): wall time, or pose time "
+        "in lockstep.",
     )
     answer_timeout: float = bounded(
         10.0,
         low=0.5,
         high=600.0,
-        doc="Wall time without a sign of the planner after which it is asked again (s). In "
-        "lockstep a planner that is in the graph may take any time.",
+        doc="Wall time without feedback of the planner after which the request is repeated "
+        "(s). There is no limit in lockstep.",
     )
     pose_timeout: float = bounded(
         5.0,
         low=0.2,
         high=60.0,
-        doc="Wall time without poses after which they count as lost (s). In lockstep they never "
-        "do: the world waits for its controllers, and everybody else for the world.",
+        doc="Wall time without poses after which they count as lost (s). There is no limit in "
+        "lockstep, because there the world waits for the controllers.",
     )

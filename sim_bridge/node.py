@@ -181,7 +181,9 @@ class BridgeNode(Node):
             self._advance()
         elif self._lockstep.due_to_tell(now, self.settings.lockstep_warning):
             names = self._listed(self._lockstep.waiting)
-            self.get_logger().warning(f"no answer to tick {self.tick} from {names}; waiting on")
+            self.get_logger().warning(
+                f"no answer to tick {self.tick} from {names}; the simulation keeps waiting"
+            )
 
     def _release_abandoned(self) -> None:
         """Do not wait for robots whose commander has left the graph; they are stopped."""

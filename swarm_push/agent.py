@@ -24,7 +24,9 @@ class AgentSettings:
     """Communication of a decentralised swarm."""
 
     decentralised: bool = bounded(
-        False, doc="Whether each robot has a node of its own; if false, one node moves all robots"
+        False,
+        doc="Whether each robot has an agent node of its own; if false, the swarm node "
+        "commands all robots.",
     )
     radius: float = bounded(
         0.8,
@@ -39,7 +41,10 @@ class AgentSettings:
         doc="Fraction of messages that is dropped on purpose, at random (dimensionless)",
     )
     seed: int = bounded(
-        0, low=0, high=2**31 - 1, doc="Seed of the random numbers that decide which are dropped"
+        0,
+        low=0,
+        high=2**31 - 1,
+        doc="Seed of the random numbers that decide which messages are dropped for tests.",
     )
     forget: float = bounded(
         0.5,

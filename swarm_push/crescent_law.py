@@ -68,8 +68,8 @@ class CrescentLawSettings:
         0.3,
         low=0.0,
         high=100.0,
-        doc="The same gain along the rim for a robot that pushes; low, because wheels that slip "
-        "sideways transmit no push (1/s)",
+        doc="Proportional gain of a pushing robot's velocity along the line of contact (1/s); "
+        "low, because wheels that slip sideways transmit no push",
     )
     press: float = bounded(
         0.01,
@@ -107,22 +107,22 @@ class CrescentLawSettings:
         0.3,
         low=0.0,
         high=0.99,
-        doc="Places on the rim are used where the outline recedes from a robot at least this "
-        "fraction as fast as where it does so fastest (dimensionless)",
+        doc="Least ratio of the speed at which the outline recedes from a place of a robot to "
+        "the highest such speed; places with less are not used (dimensionless)",
     )
     hold: float = bounded(
         0.25,
         low=0.0,
         high=1.0,
-        doc="Part of the needed wrench that robots in contact may fail to make when a push begins "
+        doc="Fraction of the needed wrench that may still be missing when a push begins "
         "(dimensionless)",
     )
     patience: float = bounded(
         3.0,
         low=0.0,
         high=600.0,
-        doc="Longest time to wait for robots in front of the object to leave, and for a better "
-        "hold (s)",
+        doc="Longest time to wait until no robot is in front of the object and robots can "
+        "apply enough wrench (s)",
     )
     stuck: float = bounded(
         12.0,
@@ -134,13 +134,13 @@ class CrescentLawSettings:
         0.02,
         low=1e-3,
         high=1.0,
-        doc="Motion along the desired twist in that time that counts as progress (m)",
+        doc="Motion along the desired twist within the time 'stuck' that counts as progress (m)",
     )
     lost: float = bounded(
         0.7,
         low=0.0,
         high=1.0,
-        doc="Part of the needed wrench that robots in contact fail to make at which a push is "
+        doc="Fraction of the needed wrench that may be missing during a push before it is "
         "interrupted (dimensionless)",
     )
 

@@ -256,7 +256,7 @@ def _heavy(force: float, available: float, needed: int | None) -> str:
     """The refusal, with its numbers."""
     text = f"too heavy: {_forces(force, available)}"
     if needed is None:
-        return f"{text}, and no more robots find room where it is pushed from"
+        return f"{text}, and no more robots find room behind the object"
     return f"{text}; at least {counted(needed)} are needed"
 
 
@@ -279,6 +279,6 @@ def _forces(force: float, available: float) -> str:
 def too_few(robots: int, least: int) -> str:
     """Why fewer robots than contacts that a target takes will not do."""
     return (
-        f"{counted(robots)} cannot turn the object to a heading: that takes a couple of forces, "
-        f"so at least {least} robots; for a position without a heading one will do"
+        f"{counted(robots)} cannot turn the object to a heading: a turn needs a couple of forces, "
+        f"so at least {least} robots; a goal without a heading needs only one"
     )

@@ -10,7 +10,9 @@ class SwarmJobSettings(ArrivalSettings, LivenessSettings):
     """When a target is reached, when a job is given up, and how robots move."""
 
     orientation: bool = bounded(
-        True, doc="Whether the heading of a goal pose is pursued; if false, any heading will do"
+        True,
+        doc="Whether the heading of a goal pose is pursued; if false, the object may arrive "
+        "with any heading",
     )
     stalled: float = bounded(
         90.0,
@@ -22,23 +24,24 @@ class SwarmJobSettings(ArrivalSettings, LivenessSettings):
         30.0,
         low=1.0,
         high=3600.0,
-        doc="The same time when the robots are only just enough: their traction is little more "
-        "than the motion needs, or one robot is left to turn an object (s)",
+        doc="Time without the object coming closer to its target after which the job fails, if "
+        "the robots are only just enough: their traction is little more than needed, or "
+        "one robot is left to turn the object (s)",
     )
     alone: float = bounded(
         10.0,
         low=0.0,
         high=3600.0,
-        doc="Time without enough robots to move the object, because none carries out its commands "
-        "or their traction is not enough, after which the job fails (s)",
+        doc="Time after which the job fails if the robots that carry out commands are too few "
+        "to move the object (s)",
     )
     apart: float = bounded(4e-3, low=0.0, high=1.0, doc="Gap that robots keep between them (m)")
     closing: float = bounded(
         3.0,
         low=0.01,
         high=100.0,
-        doc="Closing speed that is allowed between two robots, divided by the gap between them "
-        "that exceeds the one to be kept (1/s)",
+        doc="Highest closing speed of two robots, divided by the gap between them in excess of "
+        "'apart' (1/s)",
     )
     lead: float = bounded(
         0.025,

@@ -45,7 +45,8 @@ class LivenessSettings:
         0.1,
         low=1e-3,
         high=10.0,
-        doc="Commanded distance over that time below which a robot is not judged (m)",
+        doc="Distance that a robot must be commanded to move within the time limit before it "
+        "is judged dead or alive (m)",
     )
     jammed: float = bounded(
         6.0,

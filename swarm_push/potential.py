@@ -19,30 +19,37 @@ class PotentialSettings:
     """Sizes of the zones, in radii of the object, as printed."""
 
     repulsion: float = bounded(
-        1.4, low=1.0, high=10.0, doc="Radius d_rep of the repulsive zone, in radii of the object"
+        1.4,
+        low=1.0,
+        high=10.0,
+        doc="Radius d_rep of the repulsive zone around the object, in radii of the object",
     )
     attraction: float = bounded(
-        1.8, low=1.0, high=10.0, doc="Radius d_att of the attractive zone, in radii of the object"
+        1.8,
+        low=1.0,
+        high=10.0,
+        doc="Radius d_att of the attractive zone around the object, in radii of the object",
     )
     cone: float = bounded(
         0.8,
         low=0.5,
         high=0.99,
-        doc="Angle gamma_lim from the direction of motion beyond which a robot is behind the "
-        "object, as a fraction of pi (dimensionless)",
+        doc="Angle gamma_lim from the desired direction of motion above which a robot counts "
+        "as behind the object, as a fraction of pi (dimensionless)",
     )
     wires: float = bounded(
         0.7,
         low=0.1,
         high=1.0,
-        doc="Distance of the wires W_in and W_out from the object's centre, in radii of the object",
+        doc="Distance of the two wires W_in and W_out of the magnetic zone from the object's "
+        "centre, in radii of the object",
     )
     overlap: float = bounded(
         0.1,
         low=0.0,
         high=0.5,
-        doc="Part by which zones 3 and 4 are widened so that neighbouring zones overlap "
-        "(dimensionless)",
+        doc="Fraction by which zones 3 and 4 of the potential field are widened so that "
+        "neighbouring zones overlap (dimensionless)",
     )
 
 

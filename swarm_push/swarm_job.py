@@ -30,8 +30,8 @@ from swarm_push.walls import Walls
 __all__ = ["SwarmJob", "SwarmJobSettings"]
 _STATES = {
     SwarmPhase.GATHER: (JobPhase.POSITIONING, "robots gather at the object"),
-    SwarmPhase.GO_ROUND: (JobPhase.POSITIONING, "robots go round the object"),
-    SwarmPhase.REALIGN: (JobPhase.APPROACH, "robots look for hold"),
+    SwarmPhase.GO_ROUND: (JobPhase.POSITIONING, "robots go around the object"),
+    SwarmPhase.REALIGN: (JobPhase.APPROACH, "robots move to where they can push"),
     SwarmPhase.PUSH: (JobPhase.PUSHING, "robots push"),
 }
 
@@ -303,7 +303,7 @@ class SwarmJob:
             if strength is not None and strength.too_heavy is not None:
                 self.end(JobError.TOO_HEAVY, strength.too_heavy)
             else:
-                text = "no robot does as it is told" if robots else "there is no robot"
+                text = "no robot carries out its commands" if robots else "no robot is there"
                 self.end(JobError.POSITIONING_FAILED, text)
             return True
         away, turned = self.errors(pose)

@@ -31,7 +31,7 @@ def target_from_ros(message: SwarmTarget) -> Array | None:
     check_frame(message.header.frame_id, "the target")
     finite((message.x, message.y), "the target")
     if math.isinf(message.theta):
-        raise InvalidMessage("the target's heading is infinite")
+        raise InvalidMessage("the target's heading must not be infinite")
     if not message.active:
         return None
     return np.array([message.x, message.y, message.theta])
@@ -58,7 +58,7 @@ def agent_state_from_ros(message: SwarmAgentState) -> AgentState:
     check_frame(message.header.frame_id, "the state of an agent")
     pose, mean = (message.x, message.y, message.theta), (message.mean_x, message.mean_y)
     if not len(message.heard) == len(message.flow_x) == len(message.flow_y):
-        raise InvalidMessage("the state of an agent has flows of another number than robots")
+        raise InvalidMessage("the state of an agent needs as many flows as robots")
     flows = np.column_stack([message.flow_x, message.flow_y]).reshape(-1, 2)
     finite((*pose, *mean, *flows.ravel()), "the state of an agent")
     time = time_from_ros(message.header.stamp)

@@ -113,7 +113,10 @@ class SwarmMethod:
         if seen is None:
             track = self.job.track
             if track is not None and not all(track.fits(t) for t in targets):
-                return Refusal(JobError.GOAL_OCCUPIED, "the object does not fit there")
+                return Refusal(
+                    JobError.GOAL_OCCUPIED,
+                    "at the goal the object needs room for robots all around it",
+                )
             return Certificate()
         pose, robots, margin, seconds = item.mass_pose(seen.object), 1, math.inf, 0.0
         for target in targets:
@@ -212,10 +215,12 @@ def check_team(robots: Mapping[str, RobotSpec], item: ObjectSpec) -> None:
     """Raise SettingsError unless robots are round, of one type, and of controlled velocity."""
     types = list(robots.values())
     if any(t != types[0] for t in types):
-        raise SettingsError("has robots of several types; a swarm is of one type")
+        raise SettingsError("has robots of several types; a swarm needs robots of one type")
     drives = SpeedDrive | HolonomicDrive
     if not isinstance(types[0].bumper, RingBumper) or not isinstance(types[0].drive, drives):
-        raise SettingsError("has robots without a ring bumper and a controlled velocity")
+        raise SettingsError(
+            "has robots without a ring bumper and a velocity command, which a swarm needs"
+        )
 
 
 SWARM = MethodSpec("swarm", SwarmMethod, SECTIONS, check_team, "swarm-square", open_team=True)

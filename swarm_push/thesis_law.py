@@ -18,24 +18,29 @@ class ThesisLawSettings(PotentialSettings):
         0.0,
         low=0.0,
         high=10.0,
-        doc="Standard deviation of the density tangential to the object; 0: as printed for the "
-        "number of robots (m)",
+        doc="Standard deviation of the density in the direction tangential to the object (m); "
+        "0: the value of the thesis for the number of robots",
     )
     sigma_y: float = bounded(
         0.0,
         low=0.0,
         high=10.0,
-        doc="Standard deviation of the density towards the object; 0: as printed for the number of "
-        "robots (m)",
+        doc="Standard deviation of the density in the direction towards the object (m); 0: the "
+        "value of the thesis for the number of robots",
     )
     lead: float = bounded(
         0.1,
         low=1e-3,
         high=10.0,
-        doc="Distance by which the density leads the mean of the swarm, per unit of u_swarm: dt of "
-        "(4.4) (m)",
+        doc="Distance by which the density is ahead of the mean of the swarm, per unit of "
+        "u_swarm: dt of (4.4) (m)",
     )
-    gain: float = bounded(1.0, low=1e-3, high=100.0, doc="Gain of Lloyd's control (1/s)")
+    gain: float = bounded(
+        1.0,
+        low=1e-3,
+        high=100.0,
+        doc="Proportional gain of a robot's velocity towards the centroid of its cell (1/s)",
+    )
 
 
 def printed_sigmas(count: int) -> tuple[float, float]:

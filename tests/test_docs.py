@@ -131,20 +131,17 @@ def test_defaults_that_a_page_tells_are_those_of_the_settings(page):
             assert float(number) * (1e-3 if unit == "mm" else 1.0) == pytest.approx(value), name
 
 
-PLAIN = (
-    "push_planner/settings.py",
-    "push_mpc/settings.py",
-    "push_model/*.py",
-    "push_scenario/*.py",
+WITH_TEXTS = sorted(
+    path.relative_to(ROOT)
+    for path in ROOT.glob("*/**/*.py")
+    if path.relative_to(ROOT).parts[0] not in ("tests", "build") and "doc=" in path.read_text()
 )
 
 
-@pytest.mark.parametrize(
-    "path", sorted(p for g in PLAIN for p in ROOT.glob(g)), ids=lambda p: p.stem
-)
+@pytest.mark.parametrize("path", WITH_TEXTS, ids=str)
 def test_the_text_of_a_parameter_stands_alone(path):
     """As ``ros2 param describe`` shows it: a phrase of its own, that does not lean on another."""
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(ast.parse((ROOT / path).read_text())):
         if isinstance(node, ast.keyword) and node.arg == "doc":
             text = ast.literal_eval(node.value)
             assert len(text.split()) >= 2 and not text[0].islower(), text

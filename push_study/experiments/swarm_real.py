@@ -32,7 +32,7 @@ _LIMIT = 2400.0  # [s]
 def tasks(options: StudyOptions) -> list[SwarmTask]:
     """As many runs as trials, by both laws."""
     if options.scenarios != SCENARIOS:
-        raise SettingsError(f"swarm-real is about '{SCENARIOS[0]}' only")
+        raise SettingsError(f"swarm-real supports only the scenario '{SCENARIOS[0]}'")
     return [
         SwarmTask(
             SCENARIOS[0],

@@ -46,7 +46,7 @@ class ScaleTask:
 def tasks(options: StudyOptions) -> list[ScaleTask]:
     """Every number of discs."""
     if options.scenarios != SCENARIOS:
-        raise SettingsError(f"swarm-scale is about '{SCENARIOS[0]}' only")
+        raise SettingsError(f"swarm-scale supports only the scenario '{SCENARIOS[0]}'")
     world = options.world or "planar"
     return [
         ScaleTask(SCENARIOS[0], options.seed + k, count, world, options.uncertainty)

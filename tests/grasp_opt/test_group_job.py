@@ -106,7 +106,7 @@ def test_a_step_that_fails_again_and_again_ends_the_job(world):
         assert run.until(lambda: run.job.state is JobPhase.PUSHING and run.job.last.time > 2.0)
         world.move(np.array([0.6, 0.0, 0.0]))
         run.until(lambda: run.job.state is not JobPhase.PUSHING, 5.0)
-    assert run.job.error is JobError.EXECUTION_FAILED and "off its way" in run.job.reason
+    assert run.job.error is JobError.EXECUTION_FAILED and "from its trajectory" in run.job.reason
 
 
 def test_a_late_answer_changes_nothing():

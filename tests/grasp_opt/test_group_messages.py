@@ -43,7 +43,7 @@ def test_a_plan_is_the_same_on_the_other_side(plan):
 
 
 def test_plans_for_others_and_without_numbers_are_refused(plan):
-    with pytest.raises(InvalidMessage, match="not of the group"):
+    with pytest.raises(InvalidMessage, match="not in the group"):
         plan_from_ros(plan_to_ros(plan, "plate", NAMES, 0.0), ("d", "e", "f"))
     broken = plan_to_ros(plan, "plate", NAMES, 0.0)
     broken.x[3] = math.nan

@@ -52,14 +52,16 @@ def test_a_push_ends_where_its_trajectory_does():
 def test_a_robot_that_dies_is_named_within_two_seconds(who):
     step, _, time = run(GroupPush(ITEM, ROBOT, WAYS, BEND), kill=(4.0, who))
     assert step.phase is Phase.FAILED and time < 4.0 + 2.0
-    assert step.dead == (who,) and "does not move although told to" in step.reason
+    assert step.dead == (who,) and "does not move although commanded to" in step.reason
 
 
 def test_contact_is_not_searched_for_ever():
     settings = GroupPushSettings(search=3.0)
     push = GroupPush(ITEM, ROBOT, WAYS, BEND, settings)
     step, pose, time = run(push, moved={1: np.array([-0.5, 0.0])})
-    assert step.phase is Phase.FAILED and step.reason == "not every robot found contact"
+    assert (
+        step.phase is Phase.FAILED and step.reason == "not every robot made contact with the object"
+    )
     assert time == pytest.approx(3.0, abs=0.1)
     assert np.hypot(*(pose - BEND.pose[0])[:2]) < 2e-3, "those in contact wait for the others"
 
@@ -67,7 +69,7 @@ def test_contact_is_not_searched_for_ever():
 def test_an_object_that_is_too_heavy_ends_the_push():
     step, pose, time = run(GroupPush(ITEM, ROBOT, WAYS, BEND), real=replace(ITEM, mass=2.0))
     assert step.phase is Phase.FAILED and time < 15.0
-    assert "behind" in step.reason or "off its way" in step.reason or "do" in step.reason
+    assert "behind" in step.reason or "from its trajectory" in step.reason or "do" in step.reason
     assert np.hypot(*(pose - BEND.pose[0])[:2]) < 0.02
 
 

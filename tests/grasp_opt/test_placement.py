@@ -142,7 +142,9 @@ def test_a_robust_placement_has_margin_pushes_only_and_asks_no_robot_for_too_muc
         assert ((speeds * contacts.normals).sum(axis=1) > 0.0).all()
     free = Placer(item, task, 3, 0.05, replace(FEW, least_margin=0.2)).best()
     assert free.cost <= robust.cost * (1 + 1e-6)
-    with pytest.raises(NoPlacement, match=r"holds the task with a margin of 0 and 0\.5 N a robot"):
+    with pytest.raises(
+        NoPlacement, match=r"supports the task with a margin of 0 and 0\.5 N a robot"
+    ):
         robust_placement(item, task, 2, 0.05, 0.5, FEW)
 
 

@@ -117,11 +117,11 @@ def test_trajectories_that_cannot_be_pushed_are_refused():
     """A turn on the spot by two robots on a triangle, which have no couple; a way into a wall."""
     planner = StepPlanner(OPEN, plate(3), ROBOT)
     turn = screw(np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.05, 0.05, 0.2)
-    with pytest.raises(NoStep, match="no placement of 2 robots holds the task"):
+    with pytest.raises(NoStep, match="no placement of 2 robots supports the task"):
         planner.along(turn, np.zeros(3), ROW[:2], (), NOBODY)
     assert len(planner.along(turn, np.zeros(3), ROW, (), NOBODY).pushers) >= 3
     ahead = screw(np.zeros(3), np.array([2.0, 0.0, 0.0]), 0.05, 0.05, 0.2)
-    with pytest.raises(NoStep, match="too close to something"):
+    with pytest.raises(NoStep, match="too close to an obstacle"):
         planner.along(ahead, np.zeros(3), ROW, (), NOBODY)
 
 

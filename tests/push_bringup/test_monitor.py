@@ -1,4 +1,4 @@
-"""What a person is told of a job whose owner is frozen, has died, or was restarted: issue 18."""
+"""What a person is told of a job whose owner is frozen, has died, or was restarted."""
 
 import numpy as np
 import pytest

@@ -207,7 +207,7 @@ def test_a_group_has_an_optimizer_and_one_node_for_all_its_robots():
 @pytest.mark.parametrize(
     ("changes", "why"),
     [
-        ({"robots": {"a": {"type": "epuck_ring", "start": [-1, 0, 0]}}}, "a group is of 2 to 5"),
+        ({"robots": {"a": {"type": "epuck_ring", "start": [-1, 0, 0]}}}, "a group needs 2 to 5"),
         ({"objects": {}}, "no object to push"),
         (
             {

@@ -120,7 +120,7 @@ def test_a_folder_that_holds_something_else_is_left_alone(tmp_path, capsys):
     (tmp_path / "thesis.tex").write_text("years of work")
     words = ["experiment", "single-robot", "--scenarios", "short", "--trials", "1"]
     assert main([*words, "--out", str(tmp_path)]) == 2
-    assert "no study" in capsys.readouterr().err
+    assert "not a study" in capsys.readouterr().err
     assert [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
 
 
@@ -134,7 +134,7 @@ def test_two_processes_are_not_at_one_study_at_once(tmp_path, capsys):
     with (out / "study.json").open() as mark:
         fcntl.flock(mark, fcntl.LOCK_EX)
         assert main(words) == 2
-    assert f"another process is at the study in {out}" in capsys.readouterr().err
+    assert f"another process writes to the study in {out}" in capsys.readouterr().err
     assert [p.name for p in out.iterdir()] == ["study.json"]
 
 

@@ -149,7 +149,7 @@ def test_no_robot_and_only_dead_ones_are_told():
     still = {"a": np.array([-0.8, 0.1, 0.0]), "b": np.array([-0.8, -0.3, 0.0])}
     for k in range(1500):
         twists = job.step(0.02 * k, np.zeros(3), still, NONE)
-    assert job.error is JobError.POSITIONING_FAILED and "does as it is told" in job.reason
+    assert job.error is JobError.POSITIONING_FAILED and "carries out its commands" in job.reason
     assert not any(any(t) for t in twists.values())
 
 

@@ -112,7 +112,8 @@ def test_a_trajectory_is_followed_and_one_that_begins_elsewhere_refused(run):
     away, turned = error(run, bend.pose[-1])
     assert away < 5e-3 and turned < 0.03
     again = along(run, bend)
-    assert again.error_code == JobError.INVALID_GOAL and "from where it begins" in again.error_msg
+    assert again.error_code == JobError.INVALID_GOAL
+    assert "from where the trajectory begins" in again.error_msg
 
 
 @pytest.mark.long
