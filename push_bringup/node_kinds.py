@@ -5,10 +5,13 @@ its ``MethodSpec``.
 """
 
 import importlib
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from rclpy.node import Node
 
 from grasp_opt.group_method import GROUP
 from grasp_opt.placement import PlacementSettings
@@ -23,12 +26,10 @@ from push_mpc.torque_tracker import TorqueTrackerSettings
 from push_mpc.wheel_slip_nmpc import WheelSlipSettings
 from push_planner import PlannerSettings
 from push_ros.roster import RosterSettings
+from push_scenario.scenario import Scenario
 from push_supervisor import SupervisorSettings
 from sim_bridge.settings import BridgeSettings, MotionCaptureSettings, PhysicsSettings
 from swarm_push.swarm_method import SWARM
-
-if TYPE_CHECKING:
-    from push_bringup.systems import NodeSpec
 
 METHOD_MODULE = "push_ros.method_node"
 """The module whose ``main`` runs any method in a process of its own."""
@@ -60,7 +61,57 @@ class NodeKind:
         return maker(scenario=scenario, **self.passes(spec))
 
 
-def _team(spec: "NodeSpec") -> dict[str, Any]:
+@dataclass(frozen=True)
+class NodeSpec:
+    """A node of a system.
+
+    name: what it is called in messages to people; unique in the system.
+    kind: see ``kind_of``. namespace: where it lives. world: namespace of the bridge.
+    robot, robots, item, team: whom it serves; empty where it serves all.
+    parameters: further ROS parameters. remaps: names to names, besides the namespace.
+    """
+
+    name: str
+    kind: str
+    namespace: str
+    world: str
+    robot: str = ""
+    item: str = ""
+    team: str = ""
+    robots: tuple[str, ...] = ()
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    remaps: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def traits(self) -> NodeKind:
+        """What its kind is."""
+        return kind_of(self.kind)
+
+    def words(self, scenario: str) -> list[str]:
+        """Command line of its process; scenario: name or path of the file that it reads."""
+        own = {
+            "world": self.world,
+            "robot": self.robot,
+            "robots": list(self.robots),
+            "object": self.item,
+            "method": self.kind,
+        }
+        values: dict[str, Any] = {"scenario": scenario, **self.parameters}
+        values.update({name: own[name] for name in self.traits.takes})
+        remaps = {"__ns": self.namespace, **self.remaps}
+        words = ["--ros-args"]
+        for name, to in remaps.items():
+            words += ["-r", f"{name}:={to}"]
+        for name, value in values.items():
+            words += ["-p", f"{name}:={json.dumps(value)}"]
+        return words
+
+    def make(self, scenario: Scenario) -> Node:
+        """The node in this process, e.g. for a run in lockstep; a bridge waits to be started."""
+        return self.traits.make(self, scenario)
+
+
+def _team(spec: NodeSpec) -> dict[str, Any]:
     return {
         "robots": spec.robots,
         "item": spec.item,
@@ -69,7 +120,7 @@ def _team(spec: "NodeSpec") -> dict[str, Any]:
     }
 
 
-def _robot(spec: "NodeSpec") -> dict[str, Any]:
+def _robot(spec: NodeSpec) -> dict[str, Any]:
     return {"robot": spec.robot, "namespace": spec.world}
 
 

@@ -8,8 +8,9 @@ from typing import Any
 
 from push_bringup.failures import DomainInUse
 from push_bringup.launcher import Child
+from push_bringup.node_kinds import NodeSpec
 from push_bringup.node_settings import changed, resolved
-from push_bringup.systems import LIVE, NodeSpec, nodes_of, recorder
+from push_bringup.systems import LIVE, nodes_of, recorder
 from push_model.settings import SettingsError
 from push_ros.claims import world_is_claimed
 from push_ros.latched import has_publisher

@@ -5,16 +5,13 @@ A further method is a system of its own without an edit here; a system of severa
 a function that returns such a list, and a row in ``SYSTEMS``.
 """
 
-import json
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from rclpy.node import Node
-
 from grasp_opt.group_method import GROUP
-from push_bringup.node_kinds import NodeKind, kind_of
+from push_bringup.node_kinds import NodeSpec
 from push_job.method import method_names, method_spec
 from push_model.drives import TorqueDrive
 from push_model.settings import SettingsError
@@ -33,56 +30,6 @@ late answer [s] means a busy machine."""
 
 GROUP_MOST = 5
 """Robots of a group at most."""
-
-
-@dataclass(frozen=True)
-class NodeSpec:
-    """A node of a system.
-
-    name: what it is called in messages to people; unique in the system.
-    kind: see ``kind_of``. namespace: where it lives. world: namespace of the bridge.
-    robot, robots, item, team: whom it serves; empty where it serves all.
-    parameters: further ROS parameters. remaps: names to names, besides the namespace.
-    """
-
-    name: str
-    kind: str
-    namespace: str
-    world: str
-    robot: str = ""
-    item: str = ""
-    team: str = ""
-    robots: tuple[str, ...] = ()
-    parameters: Mapping[str, Any] = field(default_factory=dict)
-    remaps: Mapping[str, str] = field(default_factory=dict)
-
-    @property
-    def traits(self) -> NodeKind:
-        """What its kind is."""
-        return kind_of(self.kind)
-
-    def words(self, scenario: str) -> list[str]:
-        """Command line of its process; scenario: name or path of the file that it reads."""
-        own = {
-            "world": self.world,
-            "robot": self.robot,
-            "robots": list(self.robots),
-            "object": self.item,
-            "method": self.kind,
-        }
-        values: dict[str, Any] = {"scenario": scenario, **self.parameters}
-        values.update({name: own[name] for name in self.traits.takes})
-        remaps = {"__ns": self.namespace, **self.remaps}
-        words = ["--ros-args"]
-        for name, to in remaps.items():
-            words += ["-r", f"{name}:={to}"]
-        for name, value in values.items():
-            words += ["-p", f"{name}:={json.dumps(value)}"]
-        return words
-
-    def make(self, scenario: Scenario) -> Node:
-        """The node in this process, e.g. for a run in lockstep; a bridge waits to be started."""
-        return self.traits.make(self, scenario)
 
 
 def teams_of(scenario: Scenario) -> tuple[Team, ...]:

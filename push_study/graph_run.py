@@ -14,9 +14,10 @@ from rclpy.signals import SignalHandlerOptions
 
 from push_bringup.job_result import JobResult, result_of
 from push_bringup.monitor import Pose
+from push_bringup.node_kinds import NodeSpec
 from push_bringup.node_settings import changed, resolved
 from push_bringup.suite import scenario_goals
-from push_bringup.systems import LOCKSTEP, NodeSpec, nodes_of, teams_of
+from push_bringup.systems import LOCKSTEP, nodes_of, teams_of
 from push_model.arrays import Array
 from push_model.jobs import JobError
 from push_msgs.msg import JobState
