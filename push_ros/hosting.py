@@ -2,17 +2,17 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, Generic, TypeVar
 
 from push_ros.commander import Commander
 from push_ros.task_server import TaskAction
 
-if TYPE_CHECKING:
-    from push_ros.method_node import MethodNode
+Host = TypeVar("Host")
+"""The node that is added to, see ``MethodNode``."""
 
 
 @dataclass(frozen=True)
-class Hosting:
+class Hosting(Generic[Host]):
     """What a package adds to the node of its method.
 
     actions: further actions, made from the node. commander: in the place of the one that sends
@@ -20,6 +20,6 @@ class Hosting:
     other nodes; its result becomes the ``partners`` of the arena.
     """
 
-    actions: Callable[["MethodNode"], Sequence[TaskAction]] = lambda node: ()
-    commander: Callable[["MethodNode"], Commander | None] = lambda node: None
-    attach: Callable[["MethodNode"], Any] = lambda node: None
+    actions: Callable[[Host], Sequence[TaskAction]] = lambda node: ()
+    commander: Callable[[Host], Commander | None] = lambda node: None
+    attach: Callable[[Host], Any] = lambda node: None

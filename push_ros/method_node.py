@@ -70,7 +70,7 @@ class MethodNode(Node):
         item: str = "",
         namespace: str = "",
         world: str = "",
-        hosting: Hosting | None = None,
+        hosting: Hosting["MethodNode"] | None = None,
         memory: JobMemory | None = None,
     ) -> None:
         """spec: the method, or its name; the parameter ``method`` where it is empty. robots, item:
