@@ -286,14 +286,9 @@ class MethodNode(Node):
             return Told()
         self._missing, self._waiting = 0.0, self._poses.clock.now
         robots = {n: p for n in self.robots if (p := self._poses.pose(n)) is not None}
-        gate = self._poses.gate
-        self._seen = seen = Seen(
-            self._poses.stamp,
-            item,
-            robots,
-            self._poses.discs(self._roster.obstacles),
-            ages={n: gate.age(n) for n in (self.object, *robots) if n not in frame.seen},
-        )
+        others = self._poses.discs(self._roster.obstacles)
+        ages = self._poses.ages((self.object, *robots), frame)
+        self._seen = seen = Seen(self._poses.stamp, item, robots, others, ages=ages)
         if method is None or not self.busy:
             return Told()
         began = time.thread_time()

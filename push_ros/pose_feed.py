@@ -1,7 +1,7 @@
 """The pose stream as a node uses it: validated, gated, watched."""
 
 import struct
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -99,6 +99,10 @@ class PoseFeed:
         """``(k, 3)`` x, y, radius [m] of bodies that are seen, of radii [m] by name."""
         found = [[*p[:2], r] for name, r in radii.items() if (p := self.pose(name)) is not None]
         return np.array(found).reshape(-1, 3)
+
+    def ages(self, names: Iterable[str], frame: Frame) -> dict[str, float]:
+        """[s] since the last pose of each of the bodies that a frame does not show, by name."""
+        return {name: self.gate.age(name) for name in names if name not in frame.seen}
 
     def _on_data(self, data: bytes) -> None:
         try:

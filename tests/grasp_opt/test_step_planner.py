@@ -155,6 +155,7 @@ def test_who_stands_in_the_way_and_cannot_leave_is_not_run_over():
                 finish(sequencer.clear((), moved, np.array([[1.0, 1.0]])))
 
 
+@pytest.mark.long
 def test_robots_stop_side_by_side_before_they_come_to_the_object():
     """As far apart as at their places, less a tenth, whatever their contacts slant: from there they
     go on together, and one that stood nearer would be run into from behind."""

@@ -76,6 +76,7 @@ def test_the_answer_is_what_was_published_last(client):
     assert count == len(result.plan.segments) and len(client.paths[-1].poses) > 50
 
 
+@pytest.mark.long
 def test_a_plan_with_a_pre_emptive_push_is_published_whole(ros):
     _, goal, few = needs_preemptive_push(load_scenario("short"), START)
     client = make(**few)

@@ -45,6 +45,7 @@ def test_the_pre_emptive_push_is_the_first_of_the_plan():
     assert len({id(p) for p in told}) == len({p.cost for p in told})
 
 
+@pytest.mark.long
 def test_equal_seeds_draw_equal_pushes():
     planner, goal, _ = needs_preemptive_push(load_scenario("short"), START)
     once, again = (last(plan_after_preemptive_push(planner, START, goal, 2)) for _ in range(2))

@@ -37,6 +37,7 @@ def solved(planner, start, goal, seed=None):
     return None
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", NINE)
 def test_the_default_planner_needs_no_pre_emptive_push_in_the_nine_scenarios(name):
     scenario = load_scenario(name)

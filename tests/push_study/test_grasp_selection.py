@@ -34,6 +34,7 @@ def test_the_selected_grasp_is_better_by_its_criterion_and_both_meet_the_require
             assert away[np.triu_indices(3, 1)].min() >= 0.115 - 1e-9
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("law", "bound"), [("group", 5e-3), ("mpc", 15e-3)])
 def test_robots_take_the_grasp_and_push_to_the_end(law, bound):
     row = grasp_selection.trial(task("selected", law=law))

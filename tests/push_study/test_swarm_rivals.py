@@ -69,6 +69,7 @@ def test_the_random_field_draws_robots_to_the_object_where_it_hides_the_target()
     assert np.hypot(*np.array(gone).T).max() <= 0.128 + 1e-9
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", list(RIVALS))
 def test_equal_seeds_give_equal_runs(tmp_path, method):
     rows = [

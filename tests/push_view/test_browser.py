@@ -142,7 +142,9 @@ def test_a_page_whose_viewer_is_gone_says_so_and_finds_it_again(shown):
     port = shown.page.server.port
     shared.node = None  # what streams ask for every beat: they break off
     shown.page.server.close()
-    shown.until("document.getElementById('trouble').textContent.includes('viewer is gone')")
+    shown.until(
+        "document.getElementById('trouble').textContent.includes('does not respond any more')"
+    )
     shown.mouse("mouseReleased", shown.drag(shown.pixel(0.9, -0.4), 80.0, 0.0))
     assert shown.goals() == []
     shown.page.server = PageServer(shown.page.node, "127.0.0.1", port)
@@ -189,7 +191,7 @@ def test_what_counts_as_silence(shown):
         seen.push(at(2001));
         return seen.map(text => text.split(":")[0]); })()"""
     ) == [
-        "connecting to the viewer", "", "", "the viewer is gone", "deaf",
+        "connecting to the viewer", "", "", "the viewer does not respond any more", "deaf",
         "no node accepts goals yet", "no node accepts goals yet", "silent",
     ]  # fmt: skip
 

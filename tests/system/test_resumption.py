@@ -120,9 +120,9 @@ def spoilt(run, how):
     [
         ("moved", JobError.JOB_FORGOTTEN),
         ("reset", JobError.CLOCK_RESET),
-        ("late reset", JobError.CLOCK_RESET),
+        pytest.param("late reset", JobError.CLOCK_RESET, marks=pytest.mark.long),
         ("died too often", JobError.JOB_FORGOTTEN),
-        ("another team", JobError.NONE),
+        pytest.param("another team", JobError.NONE, marks=pytest.mark.long),
         ("ended in good order", JobError.NONE),
     ],
 )
