@@ -280,7 +280,8 @@ class SupervisorNode(Node):
             case commands.FindPath(segment):
                 circles = near.on_the_way(item, bodies)
                 wait = motions.standoff(segment, item)
-                peers.path(number, robot, wait, circles, crowded=len(circles) > 1)
+                crowded = len(near.bodies(bodies)) > 0
+                peers.path(number, robot, wait, circles, crowded)
             case commands.FollowPush(segment):
                 peers.push(number, segment, near.push(segment), heartbeat)
             case _:

@@ -351,6 +351,19 @@ def test_a_body_that_stays_on_the_goal_is_given_up_on():
         assert "overlap" in state.reason
 
 
+@pytest.mark.parametrize("others", [False, True])
+def test_a_blocked_path_is_waited_for_only_where_there_are_other_bodies(others):
+    """The object itself does not make way."""
+    scenario = crowded([0.8, 0.7, 0.0]) if others else load_scenario("short")
+    with runs(scenario) as run:
+        told, peers = [], run.run.supervisor._peers
+        ask = peers.path
+        peers.path = lambda *rest: (told.append(rest[-1]), ask(*rest))
+        run.by_topic(run.goal)
+        run.until(lambda: told)
+        assert told[0] is others
+
+
 @pytest.mark.long
 def test_a_body_in_the_way_is_gone_round():
     """Neither object nor robot touches it."""
