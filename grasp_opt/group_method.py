@@ -180,7 +180,7 @@ class GroupMethod:
             turn = se2.rotation_matrix(float(pose[2]))
             points = se2.transform(pose, command.contacts.points)
             forces = command.forces @ turn.T
-            figures.insert(3, Figure("wrench not made", float(command.lacking), "", 0.5))
+            figures.insert(3, Figure("missing part of the wrench", float(command.lacking), "", 0.5))
             for i, force in zip(plan.pushers, forces, strict=True):
                 figures.append(Figure(f"force of {self._names[i]}", math.hypot(*force), "N"))
             shapes += self._cones(points, command.contacts.normals @ turn.T)

@@ -74,7 +74,7 @@ class LivePanel:
             rows += [("method", str(message.method)), ("phase", report.phase)]
             rows += [(f.name, figure_text(f)) for f in report.figures]
             if report.solve_time > 0.0:
-                rows.append(("step", f"{1e6 * report.solve_time:.0f} µs"))
+                rows.append(("CPU time of a step", f"{1e6 * report.solve_time:.0f} µs"))
         return rows
 
     def shapes(self) -> list[dict[str, Any]]:
