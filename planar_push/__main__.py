@@ -1,5 +1,5 @@
 """``python -m planar_push``."""
 
-from planar_push.main import command
+from planar_push.entry import command
 
 command()

@@ -14,7 +14,7 @@ from push_bringup.failures import DomainInUse, SuiteFailed
 from push_model.settings import SettingsError
 from push_ros.process import prepare_environment
 
-NOT_VERBS = ("main", "arguments", "__main__")
+NOT_VERBS = ("main", "arguments", "entry", "__main__")
 
 
 def verbs() -> list[str]:

@@ -58,3 +58,26 @@ def test_a_launch_that_lost_its_interrupt_starts_nothing_and_ends(name):
     line = [sys.executable, "-c", SWALLOW.format(name=name)]
     done = subprocess.run(line, capture_output=True, text=True, timeout=60.0)
     assert "Exception ignored" in done.stderr and done.returncode == 0, done.stderr
+
+
+LOADING = """
+import os, signal, sys
+class Dropped:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIG{name})
+class Finder:  # the signal comes while the command line is loaded
+    def find_spec(self, name, path=None, target=None):
+        if name == "planar_push.main":
+            Dropped()
+sys.meta_path.insert(0, Finder())
+sys.argv[1:] = ["launch", "single", "--scenario", "short"]
+from planar_push import entry
+entry.command()
+"""
+
+
+@pytest.mark.parametrize("name", ["INT", "TERM"])
+def test_a_signal_while_the_command_line_is_loaded_ends_it_at_once(name):
+    line = [sys.executable, "-c", LOADING.format(name=name)]
+    done = subprocess.run(line, capture_output=True, text=True, timeout=60.0)
+    assert done.returncode == 130 and not done.stderr, done.stderr

@@ -98,6 +98,7 @@ def test_a_bar_on_a_terminal_and_plain_lines_elsewhere():
         assert ("3/4, 1 succeed" in text and "\r" in text) == out.isatty()
 
 
+@pytest.mark.live
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_keeps_finished_trials_and_leaves_no_process(tmp_path, number):
     """FAULTS 18 and 19."""

@@ -91,6 +91,7 @@ def test_a_group_pushes_on_with_the_friction_that_it_is_told():
         run.start()
         pushing(run, (0.5, 0.3, 0.4))
         job = run.supervisor.method.job
+        assert run.spin_until(lambda: job.last is not None, 5.0)  # its first tick
         before = job.last.command
         tell(run, {("plate", "contact_friction"): (0.05, 0.04, 0.06)})
         controller = job._step.push.controller
