@@ -6,7 +6,7 @@ nothing. Any other one replaces the job under way.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -24,7 +24,7 @@ from push_msgs.action import MoveObject
 from push_msgs.msg import JobState
 from push_ros.actions import GoalServer
 from push_ros.diagnostics import Diagnostics
-from push_ros.job_keeper import PATIENCE, JobKeeper
+from push_ros.job_keeper import PATIENCE, Bodies, JobKeeper
 from push_ros.job_memory import JobMemory, KeptJob
 from push_ros.names import Names
 from push_ros.qos import COMMAND, LATCHED
@@ -173,14 +173,12 @@ class JobIntake:
         """The node ends in good order: its job ends too."""
         self._keeper.end()
 
-    def frame(
-        self, stamp: float, bodies: Mapping[str, Array], ready: bool, reached: int = 0
-    ) -> None:
+    def frame(self, stamp: float, bodies: Bodies, ready: bool, reached: int = 0) -> None:
         """Keep the job under way, or take up the one that was under way when this node was started.
 
         Parameters
         ----------
-        stamp: [s] of a frame. bodies: poses ``(3,)`` of the object and the robots that are seen.
+        stamp: [s] of a frame. bodies: of the team, as it is seen at any later time too.
         ready: whether a job could be worked on. reached: targets of the task that are.
         """
         pending = self._keeper.pending is not None
@@ -190,7 +188,7 @@ class JobIntake:
         if not pending:
             return
         try:
-            job = self._keeper.judge(stamp, self._run, bodies) if ready else None
+            job = self._keeper.judge(stamp, self._run, bodies()) if ready else None
         except GoalRefused as refusal:
             self._drop(refusal)
             return

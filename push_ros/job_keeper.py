@@ -7,7 +7,7 @@ they were. Robots stand meanwhile, because nobody commands them. No ROS here.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -26,6 +26,10 @@ _ITEM_WAY, _ITEM_TURN = 0.1, 0.5  # [m], [rad] that the object may have moved me
 _ROBOT_WAY = 0.2  # [m] that a robot may have moved meanwhile: it stops after 0.2 s
 
 
+Bodies = Callable[[], Mapping[str, Array]]
+"""Poses ``(3,)`` [m, m, rad] of object and robots that are seen, by name; asked for when needed."""
+
+
 class JobKeeper:
     """Of one node. pending: a job that was under way when the node before this one died, and has
     not been taken up yet."""
@@ -34,7 +38,7 @@ class JobKeeper:
         """team: object, then robots."""
         self._memory, self._team = memory, team
         self._current: KeptJob | None = None
-        self._seen: tuple[float, str, Mapping[str, Array]] = (-math.inf, "", {})
+        self._seen: tuple[float, str, Bodies] = (-math.inf, "", dict)
         self.pending: KeptJob | None = None
         kept = memory.read()
         if kept is not None and kept.team == team:
@@ -65,7 +69,7 @@ class JobKeeper:
             self._current = self.pending = None
             self._memory.write(None)
 
-    def see(self, stamp: float, world: str, bodies: Mapping[str, Array], reached: int) -> None:
+    def see(self, stamp: float, world: str, bodies: Bodies, reached: int) -> None:
         """Keep the job under way as it stands in a frame of a stamp [s]. reached: targets."""
         self._seen = stamp, world, bodies
         job = self._current
@@ -74,7 +78,8 @@ class JobKeeper:
 
     def _keep(self, job: KeptJob, reached: int) -> None:
         """As the job stands in the newest frame."""
-        stamp, world, bodies = self._seen
+        stamp, world, seen = self._seen
+        bodies = seen() if self._memory.keeps else {}
         rows = tuple((n, float(p[0]), float(p[1]), float(p[2])) for n, p in bodies.items())
         self._current = job = replace(job, stamp=stamp, world=world, bodies=rows)
         left = job.targets[min(reached, len(job.targets) - 1) :] if not job.times else job.targets

@@ -44,6 +44,11 @@ class JobMemory:
     def __init__(self, descriptor: int | None = None) -> None:
         self._descriptor = descriptor
 
+    @property
+    def keeps(self) -> bool:
+        """Whether anything is kept."""
+        return self._descriptor is not None
+
     @classmethod
     def of_process(cls) -> "JobMemory":
         """The memory that this process was started with."""

@@ -268,7 +268,7 @@ class MethodNode(Node):
         self._door.go_on()
         if frame.verdict is not Stamp.REFUSED:
             ready = self.ready and self.method is not None and self._seen is not None
-            self._intake.frame(self._poses.stamp, self._bodies(), ready, self.status.index)
+            self._intake.frame(self._poses.stamp, self._bodies, ready, self.status.index)
         self._look_after_task()
 
     def _bodies(self) -> dict[str, Array]:

@@ -195,7 +195,7 @@ class SupervisorNode(Node):
         self._heartbeat_publisher.publish(Header(stamp=frame.stamp, frame_id=FRAME))
         self._tend()
         seen = {n: p for n in (self.object, self.robot) if (p := self._pose(n)) is not None}
-        self._intake.frame(self._poses.stamp, seen, self.ready and len(seen) == 2)
+        self._intake.frame(self._poses.stamp, lambda: seen, self.ready and len(seen) == 2)
         if self._ticks % 2 == 0:
             self._watch_displacement()
             if self._intake.waited_for:
