@@ -65,7 +65,7 @@ def run_trials(
     open_tasks = [(i, task) for i, task in enumerate(tasks) if i not in rows]
     _rewrite(journal, known)
     with journal.open("a", encoding="utf-8") as file, ExitStack() as stack:
-        stack.enter_context(_sigterm_as_interrupt())
+        stack.enter_context(_signals_as_interrupts())
         progress = stack.enter_context(Progress(len(tasks), len(rows)))
         results = (
             cluster_results(trial, open_tasks, scheduler)
@@ -92,8 +92,11 @@ def _rewrite(journal: Path, rows: dict[str, Row]) -> None:
 
 
 @contextmanager
-def _sigterm_as_interrupt() -> Iterator[None]:
-    """SIGTERM ends a study as Ctrl-C does: what is finished is kept."""
+def _signals_as_interrupts() -> Iterator[None]:
+    """SIGINT and SIGTERM end a study, and what is finished is kept.
+
+    Both are set: a process that a script starts in the background ignores SIGINT from its birth.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -101,8 +104,9 @@ def _sigterm_as_interrupt() -> Iterator[None]:
     def interrupt(number: int, frame: Any) -> None:
         raise KeyboardInterrupt
 
-    before = signal.signal(signal.SIGTERM, interrupt)
+    before = {n: signal.signal(n, interrupt) for n in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -121,6 +121,8 @@ def test_a_signal_keeps_finished_trials_and_leaves_no_process(tmp_path, number):
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        # As in the background of a script, where SIGINT is ignored from the start.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN),
     )
     journal = tmp_path / "rows.jsonl"
     end = time.monotonic() + 60.0
