@@ -21,6 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this verb."""
     add_system_and_scenario(parser)
     parser.add_argument("--record", default="", help="folder of the bag to record")
+    parser.add_argument("--view", action="store_true", help="serve the page too, on a free port")
     parser.add_argument("--respawn", action="store_true", help="restart nodes that die")
     add_factor(parser)
     add_namespace(parser)
@@ -28,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Check everything, then start."""
-    from push_bringup.launcher import Launcher
+    from push_bringup.launcher import Child, Launcher
     from push_bringup.preparation import check_domain, prepare
 
     setup = prepare(
@@ -40,7 +41,12 @@ def run(arguments: argparse.Namespace) -> int:
     )
     check_domain(setup.namespace)
     with tempfile.TemporaryDirectory("-planar-push") as folder:
-        launcher = Launcher(setup.write(Path(folder)), respawn=arguments.respawn)
+        children = setup.write(Path(folder))
+        if arguments.view:
+            words = ["view", "--port", "0"]
+            words += ["--namespace", setup.namespace] if setup.namespace else []
+            children.append(Child("viewer", "planar_push", words))
+        launcher = Launcher(children, respawn=arguments.respawn)
         stop_on_signals(launcher.request_stop)
         launcher.start()
         print(f"running {setup.scenario.name}; {_what_next(setup)}", flush=True)

@@ -1,41 +1,91 @@
-"""Play a bag back for the viewer: poses, map, plans and states, but no commands."""
+"""Play bags back on the page, or publish one again for RViz and similar tools."""
 
 import argparse
 import signal
 import sys
+import time
 from pathlib import Path
 
-from planar_push.arguments import add_namespace, positive
+from planar_push.arguments import add_namespace, positive, whole
 from push_bringup.systems import check_namespace
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this verb."""
-    parser.add_argument("bag")
+    parser.add_argument("bags", nargs="+", metavar="BAG", help="several are shown side by side")
+    parser.add_argument("--host", default="127.0.0.1", help="address to serve the page on")
+    parser.add_argument("--port", type=whole(0), default=8080, help="port; 0 chooses a free one")
     parser.add_argument(
-        "--factor", type=positive, default=1.0, help="pace of the playback, bag time over wall time"
+        "--publish",
+        action="store_true",
+        help="publish poses, map, plans and states of one bag on their topics instead; no commands",
+    )
+    parser.add_argument(
+        "--factor",
+        type=positive,
+        default=None,
+        help="with --publish: pace of the playback, bag time over wall time",
     )
     add_namespace(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when all has been played."""
+    """Serve the page until a signal; or 0 when all has been published."""
+    from push_record.contents import bag_scenario
+
+    bags = [Path(bag) for bag in arguments.bags]
+    check_namespace(arguments.namespace)
+    wrong = ""
+    if arguments.publish and len(bags) > 1:
+        wrong = "--publish plays one bag; without it, several are shown on the page"
+    elif not arguments.publish and (arguments.factor is not None or arguments.namespace):
+        wrong = "--factor and --namespace belong to --publish; on the page, choose the pace there"
+    try:
+        for bag in bags:
+            bag_scenario(bag)
+    except ValueError as error:
+        wrong = str(error)
+    if wrong:
+        print(f"error: {wrong}", file=sys.stderr)
+        return 2
+    return _publish(bags[0], arguments) if arguments.publish else _serve(bags, arguments)
+
+
+def _serve(bags: list[Path], arguments: argparse.Namespace) -> int:
+    from planar_push.arguments import stop_on_signals
+    from push_view.playback_server import PlaybackServer
+
+    stopped = False
+
+    def stop() -> None:
+        nonlocal stopped
+        stopped = True
+
+    print(f"reading {len(bags)} bag{'s' if len(bags) > 1 else ''}", flush=True)
+    try:
+        server = PlaybackServer(bags, arguments.host, arguments.port)
+    except OSError as error:
+        print(f"error: port {arguments.port}: {error.strerror}; try --port 0", file=sys.stderr)
+        return 2
+    stop_on_signals(stop)
+    print(f"http://{arguments.host}:{server.port}/", flush=True)
+    try:
+        while not stopped:
+            time.sleep(0.1)
+    finally:
+        server.close()
+    return 0
+
+
+def _publish(bag: Path, arguments: argparse.Namespace) -> int:
     import rclpy
     from rclpy.signals import SignalHandlerOptions
 
     from planar_push.arguments import stop_on_signals
     from push_bringup.preparation import check_domain
-    from push_record.contents import bag_scenario
     from push_record.player import PlayerNode
     from push_ros.process import Spinner
 
-    check_namespace(arguments.namespace)
-    bag = Path(arguments.bag)
-    try:
-        bag_scenario(bag)
-    except ValueError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
     check_domain(arguments.namespace)
     stopped = False
 
@@ -46,7 +96,7 @@ def run(arguments: argparse.Namespace) -> int:
     stop_on_signals(stop)
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
-        node = PlayerNode(bag, arguments.factor, arguments.namespace)
+        node = PlayerNode(bag, arguments.factor or 1.0, arguments.namespace)
         spinner = Spinner([node])
         try:
             while not (stopped or node.finished):

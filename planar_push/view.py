@@ -17,6 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Serve until a signal. The bodies are received from the bridge."""
+    from push_bringup.background_suite import BackgroundSuite
     from push_ros.process import run_node
     from push_scenario.scenario import load_scenario
     from push_view.page_server import PageServer
@@ -25,11 +26,12 @@ def run(arguments: argparse.Namespace) -> int:
     check_namespace(arguments.namespace)
     scenario = load_scenario(arguments.scenario) if arguments.scenario else None
     server: PageServer | None = None
+    starter = BackgroundSuite(arguments.namespace)
 
     def make() -> ViewerNode:
         nonlocal server
         node = ViewerNode(scenario)
-        server = PageServer(node, arguments.host, arguments.port)
+        server = PageServer(node, arguments.host, arguments.port, starter=starter)
         print(f"http://{arguments.host}:{server.port}/", flush=True)
         return node
 
@@ -42,3 +44,4 @@ def run(arguments: argparse.Namespace) -> int:
     finally:
         if server is not None:
             server.close()
+        starter.close()

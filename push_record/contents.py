@@ -11,6 +11,7 @@ from push_job.report import Report
 from push_model.arrays import Array
 from push_record.bag import read_bag, read_metadata
 from push_record.collisions import Collisions
+from push_record.planned import Plan, PlannedPush, from_group_plan, from_push_plan, merged
 from push_ros.report_conversions import report_from_ros
 from push_ros.validation import InvalidMessage, planar_pose
 from push_scenario.scenario import Scenario, scenario_from_text
@@ -28,18 +29,23 @@ STATUS = (
 """Columns of a controller's status, see push_msgs/ControllerStatus."""
 
 _SPACING = 0.02  # [s] shortest time between frames that are kept
-_MOMENTS = 2.0  # [s] between complete reports that are kept
+_MOMENTS = 2.0  # [s] between complete reports that are kept for pictures
 _MOVING = (1, 2)  # modes MOVE and PUSH of ControllerStatus
 
 
 @dataclass(frozen=True)
 class State:
-    """State of a job at a time [s]; code: of the last job that ended."""
+    """State of a job at a time [s]; code: of the last job that ended. goal ``(3,)``: of the job.
+    job: its number. step: index of the push under way, and their number."""
 
     time: float
     name: str
     reason: str
     code: int
+    goal: Array | None = None
+    job: int = 0
+    step: tuple[int, int] = (0, 0)
+    progress: float = 0.0
 
 
 @dataclass
@@ -47,10 +53,11 @@ class ReportSeries:
     """What one method or controller reported.
 
     times [s] and phases of its reports. figures: by name, unit, times [s] and values. moments: time
-    [s] and whole report, every few seconds.
+    [s] and whole report, ``spacing`` [s] apart or more.
     """
 
     method: str
+    spacing: float = _MOMENTS
     times: list[float] = field(default_factory=list)
     phases: list[str] = field(default_factory=list)
     figures: dict[str, tuple[str, list[float], list[float]]] = field(default_factory=dict)
@@ -64,14 +71,14 @@ class ReportSeries:
             _, times, values = self.figures.setdefault(figure.name, (figure.unit, [], []))
             times.append(time)
             values.append(figure.value)
-        if not self.moments or time - self.moments[-1][0] >= _MOMENTS:
+        if not self.moments or time - self.moments[-1][0] >= self.spacing:
             self.moments.append((time, report))
 
 
 @dataclass
 class Job:
-    """What a team did. goal ``(3,)``: the last one; plan: ``(n, 2)`` [m] path of the axle in each
-    push, or of the object that a group pushes; reports: by topic, of method and controllers."""
+    """What a team did. goal ``(3,)``: the last one; plans: in the order of time; planned_in: number
+    of the job that the last plan is of; reports: by topic, of method and controllers."""
 
     space: str
     system: str = ""
@@ -79,8 +86,15 @@ class Job:
     object: str = ""
     states: list[State] = field(default_factory=list)
     goal: Array | None = None
-    plan: list[Array] = field(default_factory=list)
+    plans: list[Plan] = field(default_factory=list)
+    planned_in: int = -1
     reports: dict[str, ReportSeries] = field(default_factory=dict)
+
+    @property
+    def pushes(self) -> tuple[PlannedPush, ...]:
+        """Of the last plan."""
+        plan = merged(self.plans)
+        return () if plan is None else plan.pushes
 
 
 @dataclass
@@ -121,6 +135,7 @@ class _Frames:
         self.times: list[float] = []
         self.frames: list[Array] = []
         self._last: tuple[float, Array] | None = None
+        self._newest: float | None = None
 
     def take(self, message: Any) -> None:
         frame = np.full((len(self._index), 3), np.nan)
@@ -130,8 +145,14 @@ class _Frames:
             frame[rows] = np.column_stack([message.x, message.y, message.theta])[columns]
         time = _seconds(message.header.stamp)
         self._last = (time, frame)
+        self._newest = time
         if not self.times or not 0.0 <= time - self.times[-1] < _SPACING - 1e-9:
             self._keep()
+
+    @property
+    def now(self) -> float:
+        """[s] of the newest frame."""
+        return 0.0 if self._newest is None else self._newest
 
     def finish(self) -> tuple[Array, dict[str, Array]]:
         """Times and poses by name, the last frame among them."""
@@ -163,8 +184,10 @@ def bag_scenario(bag: Path) -> tuple[Scenario, dict[str, str]]:
     return scenario_from_text(metadata["scenario"], name, str(bag)), metadata
 
 
-def load(bag: Path) -> BagContents:
-    """Read the data of a report.
+def load(bag: Path, moments: float = _MOMENTS) -> BagContents:
+    """Read the data of a report, or of a playback.
+
+    moments: [s] between whole reports that are kept, with their shapes.
 
     Raises
     ------
@@ -198,7 +221,7 @@ def load(bag: Path) -> BagContents:
                 report = report_from_ros(m)
             except InvalidMessage:  # what somebody recorded need not be right
                 continue
-            told = series.setdefault(record.topic, ReportSeries(str(m.method)))
+            told = series.setdefault(record.topic, ReportSeries(str(m.method), moments))
             told.take(_seconds(m.header.stamp), report)
         elif record.topic.endswith("/contacts"):
             collisions.take(_seconds(m.header.stamp), m.body_a, m.body_b)
@@ -208,9 +231,9 @@ def load(bag: Path) -> BagContents:
             if record.topic.endswith("/job_state"):
                 _take_state(job, m)
             elif record.topic.endswith("/group_plan"):
-                job.plan.append(np.column_stack([m.x, m.y]))
+                job.plans.append(from_group_plan(m, frames.now, _pieces(job)))
             else:
-                job.plan = [np.column_stack([s.trajectory.x, s.trajectory.y]) for s in m.segments]
+                job.plans.append(from_push_plan(m, frames.now))
     for topic, told in series.items():
         _give(contents.jobs, topic, told)
     contents.time, contents.poses = frames.finish()
@@ -230,15 +253,32 @@ def _give(jobs: dict[str, Job], topic: str, series: ReportSeries) -> None:
             return
 
 
+def _pieces(job: Job) -> int:
+    """Pieces of the job under way that have been planned before."""
+    number = job.states[-1].job if job.states else 0
+    if job.planned_in != number:
+        job.planned_in = number
+        return 0
+    return len(job.pushes)
+
+
 def _take_state(job: Job, message: Any) -> None:
     job.system, job.object = str(message.system), str(message.object)
     job.robots = tuple(str(r) for r in message.robots)
-    stamp = _seconds(message.header.stamp)
-    job.states.append(
-        State(stamp, str(message.state_name), str(message.reason), int(message.error_code))
-    )
     if message.goal.header.frame_id:
         try:
             job.goal = planar_pose(message.goal.pose, "the goal")
         except InvalidMessage:  # a recorded message need not be valid
             pass
+    job.states.append(
+        State(
+            _seconds(message.header.stamp),
+            str(message.state_name),
+            str(message.reason),
+            int(message.error_code),
+            job.goal,
+            int(message.job),
+            (int(message.step_index), int(message.step_count)),
+            float(message.progress),
+        )
+    )

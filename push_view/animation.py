@@ -11,7 +11,8 @@ from PIL import Image
 
 from push_record.contents import BagContents
 from push_view.bodies import bodies_of
-from push_view.drawing import INK, body_vertices, draw_jobs, draw_map
+from push_view.drawing import body_vertices, draw_jobs, draw_map
+from push_view.palette import INK
 
 _RATE = 15.0  # [Hz] pictures
 
@@ -37,7 +38,7 @@ def write_animation(contents: BagContents, path: Path, frames: int = 90) -> None
     still = canvas.copy_from_bbox(figure.bbox)
     shown = {
         color: PolyCollection([], facecolors=color, edgecolors=color, alpha=0.7)
-        for color in {t.color: None for t in bodies.types}
+        for color in dict.fromkeys(bodies.colours)
     }
     for collection in shown.values():
         axes.add_collection(collection, autolim=False)

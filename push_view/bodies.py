@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from push_model.arrays import Array
 from push_scenario.scenario import Scenario
-
-ROBOT, OBJECT = "#2a62c9", "#d0751c"
+from push_view.palette import EACH, OBJECT, ROBOTS, robot_colour
 
 
 @dataclass(frozen=True)
@@ -19,22 +18,19 @@ class BodyType:
     outline: Array
     robot: bool
 
-    @property
-    def color(self) -> str:
-        """Of robots or of objects."""
-        return ROBOT if self.robot else OBJECT
-
 
 @dataclass(frozen=True)
 class Bodies:
     """All bodies: robots first, then objects.
 
-    types: those that look different; type_of: ``(n,)`` index of the type of each body.
+    types: those that look different; type_of: ``(n,)`` index of the type of each body. colours: of
+    each body.
     """
 
     names: tuple[str, ...]
     types: tuple[BodyType, ...]
     type_of: NDArray[np.intp]
+    colours: tuple[str, ...]
 
     def __len__(self) -> int:
         return len(self.names)
@@ -43,18 +39,19 @@ class Bodies:
         """What a body looks like; raises ValueError when it is unknown."""
         return self.types[int(self.type_of[self.names.index(name)])]
 
+    def colour(self, name: str) -> str:
+        """Of a body; raises ValueError when it is unknown."""
+        return self.colours[self.names.index(name)]
+
     def as_json(self) -> dict[str, Any]:
-        """Names, index of the type of each, and the types with outlines [m]."""
+        """Names, index of the type and colour of each, palette, and the types with outlines [m]."""
         return {
             "names": self.names,
             "type": self.type_of.tolist(),
+            "colours": self.colours,
+            "palette": ROBOTS,
             "types": [
-                {
-                    "outline": np.round(t.outline, 5).tolist(),
-                    "color": t.color,
-                    "robot": t.robot,
-                }
-                for t in self.types
+                {"outline": np.round(t.outline, 5).tolist(), "robot": t.robot} for t in self.types
             ],
         }
 
@@ -77,4 +74,8 @@ def bodies_of(scenario: Scenario) -> Bodies:
                 index_of_spec[id(spec)] = index_of[key]
             names.append(name)
             type_of.append(index_of_spec[id(spec)])
-    return Bodies(tuple(names), tuple(types), np.array(type_of, dtype=np.intp))
+    few = len(scenario.robots) <= EACH
+    colours = [robot_colour(i if few else 0) for i in range(len(scenario.robots))]
+    colours += [OBJECT] * len(scenario.objects)
+    index = np.array(type_of, dtype=np.intp)
+    return Bodies(tuple(names), tuple(types), index, tuple(colours))

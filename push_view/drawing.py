@@ -13,8 +13,7 @@ from push_model.arrays import Array
 from push_model.occupancy import OccupancyGrid
 from push_record.contents import BagContents, Job
 from push_view.bodies import Bodies, bodies_of
-
-PLAN, GOAL, INK = "#777777", "#c22f3d", "#222222"
+from push_view.palette import GOAL, robot_colour
 
 _NAMED = 6  # number of bodies up to which each is named in the legend
 _WAY_POINTS = 2000  # number of points with which a path is drawn
@@ -45,11 +44,11 @@ def draw_body(axes: Axes, outline: Array, pose: Array, color: str, **style: Any)
 
 def body_vertices(bodies: Bodies, poses: dict[str, Array], moment: int) -> dict[str, list[Array]]:
     """World outlines ``(n, 2)`` [m] of the bodies seen at one time, by colour."""
-    result: dict[str, list[Array]] = {t.color: [] for t in bodies.types}
-    for name, type_of in zip(bodies.names, bodies.type_of, strict=True):
+    result: dict[str, list[Array]] = {c: [] for c in bodies.colours}
+    for name, type_of, colour in zip(bodies.names, bodies.type_of, bodies.colours, strict=True):
         if name in poses and np.isfinite(poses[name][moment]).all():
-            kind = bodies.types[type_of]
-            result[kind.color].append(se2.transform(poses[name][moment], kind.outline))
+            outline = bodies.types[type_of].outline
+            result[colour].append(se2.transform(poses[name][moment], outline))
     return result
 
 
@@ -70,14 +69,14 @@ def draw_ways(axes: Axes, bodies: Bodies, poses: dict[str, Array]) -> None:
         members = [n for n in members if bodies.type(n) is kind]
         if few:
             for name in members:
-                axes.plot(*poses[name][:, :2].T, color=kind.color, lw=1.4, label=name)
+                axes.plot(*poses[name][:, :2].T, color=bodies.colour(name), lw=1.4, label=name)
             continue
         step = max(1, len(next(iter(poses.values()))) * len(poses) // (_WAY_POINTS * 100))
         label = "robots" if kind.robot else "objects"
         axes.add_collection(
             LineCollection(
                 [poses[n][::step, :2] for n in members],
-                colors=kind.color,
+                colors=[bodies.colour(n) for n in members],
                 linewidths=0.5,
                 alpha=0.6,
                 label=None if label in named else label,
@@ -99,11 +98,14 @@ def moments(count: int, bodies: int) -> Array:
 
 def draw_jobs(axes: Axes, bodies: Bodies, jobs: Iterable[Job]) -> None:
     """Plans and goals of some teams."""
-    planned = aimed = False
+    planned: set[str] = set()
+    aimed = False
     for job in jobs:
-        for way in job.plan:
-            axes.plot(*way.T, color=PLAN, lw=1.0, ls="--", label=None if planned else "plan")
-            planned = True
+        for push in job.pushes:
+            colour, label = robot_colour(push.number), push.name
+            shown = None if label in planned else label
+            axes.plot(*push.path.T, color=colour, lw=1.0, ls="--", label=shown)
+            planned.add(label)
         if job.goal is not None and job.object in bodies.names:
             outline = bodies.type(job.object).outline
             goal = draw_body(axes, outline, job.goal, GOAL, fill=False, lw=1.6)

@@ -15,7 +15,8 @@ from matplotlib.backends.backend_pdf import PdfPages
 from push_model import se2
 from push_record.contents import BagContents, Job, load
 from push_view.animation import write_animation
-from push_view.drawing import INK, draw_trajectory
+from push_view.drawing import draw_trajectory
+from push_view.palette import INK
 from push_view.report_panel import draw_report
 
 PRODUCTS = ("trajectory.png", "animation.gif", "report.pdf")

@@ -1,7 +1,5 @@
 """What page and report show of a method: its figures and its shapes. Knows no method by name."""
 
-import colorsys
-import zlib
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -11,10 +9,12 @@ from push_job.report import Drawable, Report, ShapeKind
 from push_msgs.msg import Report as ReportMessage
 from push_ros.names import Names
 from push_ros.qos import STATUS
-from push_ros.report_conversions import figure_text, report_from_ros
+from push_ros.report_conversions import report_from_ros
 from push_ros.validation import InvalidMessage
 from push_view.bodies import bodies_of
-from push_view.drawing import INK, draw_body
+from push_view.drawing import draw_body
+from push_view.page_data import rows_json, shapes_json
+from push_view.palette import INK, layer_colour
 
 if TYPE_CHECKING:
     from push_record.contents import BagContents, Job, ReportSeries
@@ -24,27 +24,6 @@ _SHOWN = 3  # moments that are drawn
 _ABOUT = 0.75  # [m] about the object that is drawn
 _CHARTS = 5  # units of figures that are drawn
 _NAMES = {"m": ("[mm]", 1e3), "s": ("[ms]", 1e3), "rad": ("[rad]", 1.0)}
-_COLOURS = {
-    "forces": "#1b7837",
-    "friction cones": "#9cc8a5",
-    "wrench": "#762a83",
-    "way": "#777777",
-    "density": "#7b6fb0",
-    "cells": "#aaaaaa",
-    "centroids": "#c05a1a",
-    "region": "#cccccc",
-    "target": "#c22f3d",
-    "not moving": "#8a1c1c",
-}
-
-
-def layer_colour(layer: str) -> str:
-    """The colour of a layer: a fixed one, or one that follows from its name."""
-    if layer in _COLOURS:
-        return _COLOURS[layer]
-    hue = (zlib.crc32(layer.encode()) % 360) / 360.0
-    red, green, blue = (round(255 * v) for v in colorsys.hls_to_rgb(hue, 0.4, 0.55))
-    return f"#{red:02x}{green:02x}{blue:02x}"
 
 
 class LivePanel:
@@ -67,30 +46,13 @@ class LivePanel:
 
         return take
 
-    def rows(self) -> list[tuple[str, str]]:
+    def rows(self) -> list[dict[str, Any]]:
         """What each figure is, and its value with a unit; what is not finite is a dash."""
-        rows = []
-        for message, report in self._reports.values():
-            rows += [("method", str(message.method)), ("phase", report.phase)]
-            rows += [(f.name, figure_text(f)) for f in report.figures]
-            if report.solve_time > 0.0:
-                rows.append(("CPU time of a step", f"{1e6 * report.solve_time:.0f} µs"))
-        return rows
+        return rows_json((str(m.method), report) for m, report in self._reports.values())
 
     def shapes(self) -> list[dict[str, Any]]:
         """For the page: layer, kind, colour, radius [m] and points [mm] of each shape."""
-        found = [s for _, report in self._reports.values() for s in report.shapes]
-        return [
-            {
-                "layer": s.layer,
-                "kind": int(s.kind),
-                "colour": layer_colour(s.layer),
-                "radius": round(float(s.radius), 4),
-                "points": np.round(1e3 * s.points).astype(int).tolist(),
-            }
-            for s in found
-            if np.isfinite(s.points).all()
-        ]
+        return shapes_json(report for _, report in self._reports.values())
 
     def close(self) -> None:
         """Leave the graph."""
@@ -194,7 +156,7 @@ def _draw_moment(
     bodies = bodies_of(contents.scenario)
     for name, poses in contents.poses.items():
         if k < len(poses) and np.isfinite(poses[k]).all() and name in bodies.names:
-            colour = INK if name == job.object else bodies.type(name).color
+            colour = INK if name == job.object else bodies.colour(name)
             draw_body(axes, bodies.type(name).outline, poses[k], colour, fill=False, lw=0.9)
     draw_shapes(axes, report.shapes)
     if job.object in contents.poses and k < len(contents.poses[job.object]):

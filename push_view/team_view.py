@@ -2,26 +2,32 @@
 
 import contextlib
 import math
+import time
+from collections.abc import Callable, Sequence
 from typing import Any
 
-import numpy as np
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Path
+from rclpy.action import ActionClient
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from push_model.arrays import Array
-from push_msgs.msg import JobState
+from push_msgs.action import MoveObject
+from push_msgs.msg import GroupPlan, JobState, PushPlan
+from push_record.planned import Plan, from_group_plan, from_path, from_push_plan, merged
+from push_record.topics import MANY
 from push_ros.conversions import pose_stamped_to_ros, time_from_ros
 from push_ros.names import Names
 from push_ros.process import heard
 from push_ros.qos import COMMAND, LATCHED
 from push_ros.validation import InvalidMessage, planar_pose
 from push_view.event_board import EventBoard
+from push_view.graph_delay import GraphDelay
+from push_view.page_data import plan_json
 from push_view.report_panel import LivePanel
 
 _LOG = 60  # states kept
-_POINTS = 400  # of a path that are sent to a page
 
 
 def stamp_text(message: PoseStamped) -> str:
@@ -35,26 +41,38 @@ class TeamView:
     def __init__(self, node: Node, names: Names, board: EventBoard) -> None:
         self.names, self.space = names, names.team_space
         self.hears = False
+        self.delay = GraphDelay()
+        self._commands: Any = None
         self._node, self._board = node, board
         self._panel: LivePanel | None = None
         self._log: list[list[Any]] = []
         self._of = ("", ())  # system and robots that the panel is of
+        self._plans: list[Plan] = []
+        self._job, self._planned_in = 0, -1
         self._goals = node.create_publisher(PoseStamped, names.team("goal_pose"), COMMAND)
         self._cancel = node.create_client(Trigger, names.team("cancel"))
+        self._execute = node.create_client(Trigger, names.team("execute"))
+        self._previews = ActionClient(node, MoveObject, names.team("move_object"))
+        subscribe, at = node.create_subscription, names.team
         self._subscriptions = [
-            node.create_subscription(JobState, names.team("job_state"), self._on_state, LATCHED),
-            node.create_subscription(Path, names.team("push_path"), self._on_path, LATCHED),
+            subscribe(JobState, at("job_state"), self._on_state, LATCHED),
+            subscribe(PushPlan, at("push_plan"), self._on_push_plan, LATCHED),
+            subscribe(GroupPlan, at("group_plan"), self._on_group_plan, LATCHED),
+            subscribe(Path, at("push_path"), self._on_path, LATCHED),
         ]
 
     def close(self) -> None:
         """Remove the team from the graph and from the pages."""
         for subscription in self._subscriptions:
             self._node.destroy_subscription(subscription)
+        self._watch_commands(())
         self._node.destroy_publisher(self._goals)
         self._node.destroy_client(self._cancel)
+        self._node.destroy_client(self._execute)
+        self._previews.destroy()
         if self._panel is not None:
             self._panel.close()
-        for kind in ("team", "members", "log", "path", "panel"):
+        for kind in ("team", "members", "log", "plan", "panel"):
             self._board.drop(f"{kind} {self.space}")
 
     def look(self) -> None:
@@ -63,8 +81,14 @@ class TeamView:
 
     def show_panel(self) -> None:
         """Bring the figures and shapes of its reports up to date."""
-        if self._panel is not None:
-            self._put("panel", rows=self._panel.rows(), shapes=self._panel.shapes())
+        if self._panel is None:
+            return
+        rows, delay = self._panel.rows(), self.delay.summary()
+        if delay is not None:
+            text = f"{1e3 * delay[0]:.1f} ms, longest {1e3 * delay[1]:.1f} ms"
+            value = round(delay[0], 5)
+            rows.append({"name": "poses to command", "text": text, "value": value, "unit": "s"})
+        self._put("panel", rows=rows, shapes=self._panel.shapes())
 
     def goal_message(self, pose: Array, nanoseconds: int) -> PoseStamped:
         """A goal ``(3,)``, stamped with a wall time [ns]."""
@@ -77,9 +101,21 @@ class TeamView:
         """Publish a goal."""
         self._goals.publish(message)
 
-    def cancel(self) -> None:
-        """Ask to cancel the job."""
-        self._cancel.call_async(Trigger.Request())
+    def preview(self, message: PoseStamped) -> None:
+        """Ask for a plan to a goal that waits until ``execute``."""
+        self._previews.send_goal_async(MoveObject.Goal(goal=message, plan_only=True))
+
+    def cancel(self, answer: Callable[[bool, str], None]) -> None:
+        """Ask to cancel the job, or to drop the plan that waits."""
+        self._ask(self._cancel, answer)
+
+    def execute(self, answer: Callable[[bool, str], None]) -> None:
+        """Ask to carry out the plan that waits."""
+        self._ask(self._execute, answer)
+
+    def _ask(self, client: Any, answer: Callable[[bool, str], None]) -> None:
+        future = client.call_async(Trigger.Request())
+        future.add_done_callback(lambda f: answer(f.result().success, f.result().message))
 
     def _put(self, kind: str, **data: Any) -> None:
         self._board.put(f"{kind} {self.space}", kind, {"space": self.space, **data})
@@ -90,6 +126,7 @@ class TeamView:
             with contextlib.suppress(InvalidMessage):
                 goal = planar_pose(message.goal.pose, "the goal").tolist()
         self._follow(message)
+        self._job = int(message.job)
         progress = float(message.progress)
         self._put(
             "team",
@@ -104,6 +141,7 @@ class TeamView:
             progress=round(progress, 3) if math.isfinite(progress) else 0.0,
             step=[int(message.step_index) + 1, int(message.step_count)],
             replans=int(message.replans),
+            plan_ready=bool(message.plan_ready),
             refusals=int(message.refusals),
             refusal=message.refusal,
             refused_stamp=stamp_text(message.refused_goal),
@@ -125,14 +163,38 @@ class TeamView:
             self._panel.close()
             self._board.drop(f"panel {self.space}")
         self._panel = LivePanel(self._node, self.names, of[1])
+        self._watch_commands(of[1])
+
+    def _watch_commands(self, robots: Sequence[str]) -> None:
+        """Measure the delay of the first robot's commands."""
+        if self._commands is not None:
+            self._node.destroy_subscription(self._commands)
+            self._commands = None
+        if robots and len(robots) < MANY:
+            self._commands = self._node.create_subscription(
+                TwistStamped,
+                self.names.robot(robots[0], "cmd_vel"),
+                lambda data: self.delay.command(data, time.monotonic()),
+                COMMAND,
+                raw=True,
+            )
+
+    def _on_push_plan(self, message: PushPlan) -> None:
+        self._plans = [from_push_plan(message, 0.0)]
+        self._put_plan()
+
+    def _on_group_plan(self, message: GroupPlan) -> None:
+        if self._planned_in != self._job:
+            self._planned_in, self._plans = self._job, []
+        self._plans.append(from_group_plan(message, 0.0, len(self._plans)))
+        self._put_plan()
 
     def _on_path(self, message: Path) -> None:
-        points = np.array([[p.pose.position.x, p.pose.position.y] for p in message.poses])
-        points = points.reshape(-1, 2)
-        if not np.isfinite(points).all():
-            points = np.zeros((0, 2))
-        if len(points) > _POINTS:
-            points = points[np.linspace(0, len(points) - 1, _POINTS).astype(int)]
-        self._put(
-            "path", x=np.round(points[:, 0], 4).tolist(), y=np.round(points[:, 1], 4).tolist()
-        )
+        """A path is shown where nothing says more about the plan."""
+        plans = ("push_plan", "group_plan")
+        if not any(self._node.count_publishers(self.names.team(t)) for t in plans):
+            self._plans = [from_path(message, 0.0)]
+            self._put_plan()
+
+    def _put_plan(self) -> None:
+        self._put("plan", **plan_json(merged(self._plans)))

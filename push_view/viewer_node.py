@@ -24,28 +24,34 @@ from std_msgs.msg import Bool, String
 
 from push_model.occupancy import OccupancyGrid
 from push_model.settings import SettingsError
+from push_msgs.msg import Belief as BeliefMessage
 from push_msgs.msg import Poses
 from push_ros.conversions import grid_from_ros
 from push_ros.names import Names, names_of
-from push_ros.qos import LATCHED, STREAM
+from push_ros.qos import BELIEF, LATCHED, STREAM
 from push_ros.validation import InvalidMessage
 from push_scenario.scenario import Scenario, scenario_from_mapping
+from push_view.belief_table import BeliefTable
 from push_view.bodies import bodies_of
 from push_view.event_board import EventBoard
+from push_view.page_data import obstacles_json
 from push_view.pose_table import PoseTable
 from push_view.suite_watch import SuiteWatch
 from push_view.team_spaces import team_spaces
 from push_view.team_view import TeamView, stamp_text
+from push_view.world_controls import WorldControls
 
 PERIOD = 0.05
 """[s] between two frames that are sent to pages."""
 _LOOK = 0.25  # [s] between two checks of the graph
 _SEARCH = 1.0  # [s] between two searches for teams
+_OCCUPIED = 110  # grey
+_ANSWER = 3.0  # [s] that a request is waited for
 _Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 class NotTaken(Exception):
-    """A goal or a cancel request that is not passed on; the text says why."""
+    """A request that is not passed on, or that a node refused; the text says why."""
 
 
 class ViewerNode(Node):
@@ -64,7 +70,10 @@ class ViewerNode(Node):
         self._table: PoseTable | None = None
         self._revision = 0
         self._frame: bytes | None = None
+        self._belief: BeliefTable | None = None
+        self._controls = WorldControls(self, self.names)
         self._last_stamp = 0
+        self._offered: list[str] = []
         self._watch = SuiteWatch(self.names.world("poses"), time.monotonic())
         if scenario is not None:
             self._show(scenario)
@@ -73,6 +82,7 @@ class ViewerNode(Node):
         self.create_subscription(GridMessage, world("map"), self._on_map, LATCHED)
         self.create_subscription(String, world("scenario"), self._on_scenario, LATCHED)
         self.create_subscription(Bool, world("paused"), self._on_paused, LATCHED)
+        self.create_subscription(BeliefMessage, world("belief"), self._on_belief, BELIEF)
         wall = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(PERIOD, self._work, clock=wall)
         self.create_timer(_LOOK, self._look, clock=wall)
@@ -87,37 +97,61 @@ class ViewerNode(Node):
         return {
             "trouble": trouble,
             "paused": self._watch.paused,
+            "offered": self._offered,
             "teams": {t.space: trouble or self._deaf(t) for t in teams},
         }
 
     def map_image(self) -> bytes | None:
-        """The map as a PNG, the first row on top; None while there is none."""
+        """The map as a PNG, the first row on top, free cells transparent; None if there is none."""
         with self._lock:
             grid = self._grid
         if grid is None:
             return None
         data = BytesIO()
-        pixels = np.where(grid.occupied[::-1], 60, 255).astype(np.uint8)
-        Image.fromarray(pixels).save(data, "png")
+        pixels = np.zeros((*grid.occupied.shape, 2), dtype=np.uint8)  # grey, opacity
+        pixels[grid.occupied[::-1]] = _OCCUPIED, 255
+        Image.fromarray(pixels, "LA").save(data, "png")
         return data.getvalue()
 
-    def send_goal(self, space: str, x: float, y: float, theta: float) -> str:
+    def send_goal(self, space: str, x: float, y: float, theta: float, preview: bool = False) -> str:
         """Ask a team for a goal pose [m, m, rad].
 
         The goal gets a unique wall-time stamp, which is returned. JobState.goal or
         JobState.refused_goal with that stamp says what became of it. space: of the team; empty:
-        the first. Raises NotTaken if no node would accept it.
+        the first. preview: plan only, and wait for ``execute``. Raises NotTaken if no node would
+        accept it.
         """
         team = self._ready(space)
         with self._lock:
             self._last_stamp = max(time.time_ns(), self._last_stamp + 1)
             message = team.goal_message(np.array([x, y, theta]), self._last_stamp)
-        self._requests.put(lambda: team.send(message))
+        self._requests.put(lambda: team.preview(message) if preview else team.send(message))
         return stamp_text(message)
 
-    def cancel(self, space: str) -> None:
-        """Ask a team to cancel its job. Raises NotTaken if no node would receive it."""
-        self._requests.put(self._ready(space).cancel)
+    def cancel(self, space: str) -> str:
+        """Ask a team to cancel its job; its answer. Raises NotTaken if there is nothing to
+        cancel, or if no node would receive it."""
+        return self._wait(self._ready(space).cancel)
+
+    def execute(self, space: str) -> str:
+        """Ask a team to carry out the plan that waits; its answer. Raises NotTaken, as above."""
+        return self._wait(self._ready(space).execute)
+
+    def control(self, name: str, values: dict[str, Any]) -> str:
+        """A request to the world, see ``WorldControls``; its answer. Raises NotTaken."""
+        return self._wait(lambda answer: self._controls.ask(name, values, answer))
+
+    def _wait(self, ask: Callable[[Callable[[bool, str], None]], None]) -> str:
+        """Ask in the executor's thread, and wait for the answer in this one."""
+        answers: queue.SimpleQueue[tuple[bool, str]] = queue.SimpleQueue()
+        self._requests.put(lambda: ask(lambda good, text: answers.put((good, text))))
+        try:
+            good, text = answers.get(timeout=_ANSWER)
+        except queue.Empty:
+            raise NotTaken(f"no answer within {_ANSWER:g} s") from None
+        if not good:
+            raise NotTaken(text)
+        return text
 
     def _ready(self, space: str) -> TeamView:
         with self._lock:
@@ -140,8 +174,14 @@ class ViewerNode(Node):
         self._table = PoseTable(bodies_of(scenario))
         self._frame = None
         self.board.drop("poses")
-        data = {"revision": self._revision, **self._table.bodies.as_json()}
+        data = {
+            "revision": self._revision,
+            "obstacles": obstacles_json(scenario.environment),
+            **self._table.bodies.as_json(),
+        }
         self.board.put("bodies", "bodies", data)
+        self._belief = BeliefTable(scenario)
+        self._put_belief()
 
     def _on_scenario(self, message: String) -> None:
         where = self.names.world("scenario")
@@ -159,8 +199,25 @@ class ViewerNode(Node):
                     del self._teams[space]
         self._list_teams()
 
+    def _put_belief(self) -> None:
+        if self._belief is not None:
+            self.board.put("belief", "belief", {"rows": self._belief.as_json()})
+
+    def _on_belief(self, message: BeliefMessage) -> None:
+        if self._belief is None:
+            return
+        try:
+            self._belief.take(message)
+        except InvalidMessage as error:
+            self.get_logger().warning(f"refused a belief: {error}")
+            return
+        self._put_belief()
+
     def _on_poses(self, data: bytes) -> None:
-        self._watch.poses_came(time.monotonic())
+        now = time.monotonic()
+        self._watch.poses_came(now)
+        for team in self._teams.values():
+            team.delay.poses(data, now)
         self._frame = data  # read by _work, at most as often as it is sent to pages
 
     def _on_paused(self, message: Bool) -> None:
@@ -194,7 +251,8 @@ class ViewerNode(Node):
         self.board.put("poses", "poses", {"revision": self._revision, **self._table.as_json()})
 
     def _look(self) -> None:
-        """Look up in the graph who publishes poses."""
+        """Look up in the graph who publishes poses, and who answers requests."""
+        self._offered = self._controls.offered()
         self._watch.looked(time.monotonic(), self.count_publishers(self.names.world("poses")))
         for team in self._teams.values():
             team.look()

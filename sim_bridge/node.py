@@ -13,7 +13,7 @@ from std_srvs.srv import SetBool
 from push_model.arrays import Rows
 from push_model.se2 import compose, pose
 from push_model.settings import SettingsError
-from push_msgs.srv import Displace, LoadScenario, Reset
+from push_msgs.srv import Displace, Kill, LoadScenario, Reset
 from push_ros.diagnostics import Diagnostics
 from push_ros.names import Names, space
 from push_ros.parameters import declare_settings
@@ -88,6 +88,7 @@ class BridgeNode(Node):
         service(LoadScenario, at("bridge/load_scenario"), self._on_load)
         service(SetBool, at("bridge/pause"), self._on_pause)
         service(Displace, at("displace"), self._on_displace)
+        service(Kill, at("bridge/kill"), self._on_kill)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         wall = 0.05 if self.settings.lockstep else self.period / self.settings.real_time_factor
         self._timer = self.create_timer(max(wall, 1e-3), self._on_timer, clock=steady)
@@ -286,6 +287,17 @@ class BridgeNode(Node):
             response.success = True
         except SettingsError as error:
             response.success, response.message = False, str(error)
+        return response
+
+    def _on_kill(self, request: Any, response: Any) -> Any:
+        assert self.world is not None
+        response.success = request.robot in self._scenario.robots
+        if response.success:
+            self.world.kill(request.robot)
+            response.message = f"{request.robot} obeys no more, until the world is reset"
+        else:
+            known = ", ".join(list(self._scenario.robots)[:_SHOWN])
+            response.message = f"no robot '{request.robot}'; there are: {known}"
         return response
 
     def _state(self) -> dict[str, Any]:

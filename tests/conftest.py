@@ -5,7 +5,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 from PIL import Image
 
-from push_ros.claims import claim_domain, release_domain
+from push_ros.claims import own_domain
 from push_ros.process import prepare_environment
 from push_scenario.scenario import config_directory, load_scenario
 
@@ -17,12 +17,18 @@ settings.register_profile(
 settings.load_profile("repeatable")
 
 
+@pytest.fixture(autouse=True, scope="session")
+def session_domain():
+    """What is set up for several tests has a ROS domain that no other process has."""
+    with own_domain() as number:
+        yield number
+
+
 @pytest.fixture(autouse=True)
 def domain():
     """Every test has a ROS domain of its own."""
-    number = claim_domain()
-    yield number
-    release_domain(number)
+    with own_domain() as number:
+        yield number
 
 
 @pytest.fixture(scope="session")

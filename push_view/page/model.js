@@ -1,16 +1,18 @@
-// The state of the page, updated by the events of the server.
+// The state of the page, updated by the events of the server, or by a recording.
 
 export const LONGEST_SILENCE = 800;   // [ms] without an event after which the server counts as gone
 const TRAIL_STEP = 0.004, TRAIL_LENGTH = 3000, TRAILED = 60;   // [m], points, bodies
 const LENGTH = 1e-4, ANGLE = 1e-3;    // units of poses: [m], [rad]
+const SPACING = 0.1, KEPT = 6000;     // [s] between errors that are kept; points of a series
 
 export const emptyModel = () => ({
   bodies: null, index: new Map(), poses: null, time: null, lost: new Set(), trails: new Map(),
-  map: null, spaces: [], teams: new Map(), suite: null, heard: -Infinity,
+  map: null, spaces: [], teams: new Map(), suite: null, heard: -Infinity, belief: [],
 });
 
 export const newTeam = () => ({
-  state: null, robots: [], log: [], path: null, rows: [], shapes: [], members: new Set(), job: null,
+  state: null, robots: [], log: [], plan: {pushes: [], ways: []}, rows: [], shapes: [], members: new Set(),
+  series: new Map(),
 });
 
 const teamOf = (model, space) => {
@@ -18,10 +20,38 @@ const teamOf = (model, space) => {
   return model.teams.get(space);
 };
 
+export const turn = a => Math.abs(Math.atan2(Math.sin(a), Math.cos(a)));
+
+// Distance [m] and angle [rad] of a team's object from its goal; null without either.
+export function errorOf(model, team) {
+  const state = team?.state, pose = poseOf(model, model.index.get(state?.object)), goal = state?.goal;
+  return pose && goal ? [Math.hypot(pose.x - goal[0], pose.y - goal[1]), turn(pose.theta - goal[2])] : null;
+}
+
+// Add a value to a series of a team.
+function record(team, name, unit, limit, t, value) {
+  if (!team.series.has(name)) team.series.set(name, {unit, limit, t: [], v: []});
+  const series = team.series.get(name);
+  if (series.t.length && t <= series.t.at(-1)) return;
+  series.t.push(t); series.v.push(value);
+  if (series.t.length > KEPT) {   // half as many, over the same time
+    series.t = series.t.filter((_, i) => i % 2); series.v = series.v.filter((_, i) => i % 2);
+  }
+}
+
 function takePoses(model, data) {
   if (data.revision !== model.bodies?.revision) return;
-  if (model.time !== null && data.t < model.time - 0.5) model.trails.clear();
+  if (model.time !== null && data.t < model.time - 0.5) {   // the world was reset
+    model.trails.clear();
+    for (const team of model.teams.values()) team.series.clear();
+  }
   model.poses = data; model.time = data.t; model.lost = new Set(data.lost);
+  for (const team of model.teams.values()) {
+    const error = errorOf(model, team), last = team.series.get("position error")?.t.at(-1) ?? -Infinity;
+    if (!error || data.t - last < SPACING) continue;
+    record(team, "position error", "m", undefined, data.t, error[0]);
+    record(team, "orientation error", "rad", undefined, data.t, error[1]);
+  }
   if (model.bodies.names.length > TRAILED) return;
   for (let i = 0; i < data.x.length; i++) {
     const pose = poseOf(model, i);
@@ -37,6 +67,7 @@ const takers = {
   suite: (model, data) => { model.suite = data; },
   map: (model, data) => { model.map = data; },
   poses: takePoses,
+  belief: (model, data) => { model.belief = data.rows; },
   bodies: (model, data) => {
     model.bodies = data; model.poses = null; model.time = null; model.trails.clear();
     model.index = new Map(data.names.map((name, i) => [name, i]));
@@ -58,8 +89,15 @@ const takers = {
     team.robots = data.robots; takeMembers(model, team);
   },
   log: (model, data) => { teamOf(model, data.space).log = data.entries; },
-  path: (model, data) => { teamOf(model, data.space).path = data; },
-  panel: (model, data) => { Object.assign(teamOf(model, data.space), {rows: data.rows, shapes: data.shapes}); },
+  plan: (model, data) => { teamOf(model, data.space).plan = data; },
+  panel: (model, data) => {
+    const team = teamOf(model, data.space);
+    Object.assign(team, {rows: data.rows, shapes: data.shapes});
+    if (model.time === null || !busy(team)) return;
+    for (const {name, unit, limit, value} of data.rows) {
+      if (value !== undefined) record(team, name, unit, limit, model.time, value);
+    }
+  },
 };
 
 function takeMembers(model, team) {
@@ -74,10 +112,32 @@ export function take(model, kind, data, now) {
   takers[kind](model, data);
 }
 
+export const busy = team => Boolean(team?.state) && team.state.state !== "IDLE";
+
 export function poseOf(model, i) {
   const p = model.poses;
   if (i === undefined || !p || p.x[i] == null) return null;
   return {x: p.x[i] * LENGTH, y: p.y[i] * LENGTH, theta: p.a[i] * ANGLE};
+}
+
+// Index of the body at a place [m], robots before objects; undefined where there is none.
+export function bodyAt(model, {x, y}) {
+  const hits = (model.bodies?.names ?? []).map((_, i) => i).filter(i => {
+    const pose = poseOf(model, i);
+    return pose && inside(model.bodies.types[model.bodies.type[i]].outline, pose, x, y);
+  });
+  return hits[0];
+}
+
+function inside(outline, pose, x, y) {
+  const c = Math.cos(pose.theta), s = Math.sin(pose.theta);
+  const u = c * (x - pose.x) + s * (y - pose.y), v = -s * (x - pose.x) + c * (y - pose.y);
+  let odd = false;
+  outline.forEach(([ax, ay], i) => {
+    const [bx, by] = outline[(i + 1) % outline.length];
+    if (ay > v !== by > v && u < ax + (v - ay) * (bx - ax) / (by - ay)) odd = !odd;
+  });
+  return odd;
 }
 
 // Why a team accepts no goal now; empty if it does. A paused suite accepts goals.
@@ -92,11 +152,14 @@ export function trouble(model, space, now) {
 
 // The answer to a goal that this page sent, found by its stamp: {kind, text}, or null.
 export function answerTo(sent, team) {
+  if (!sent?.stamp && sent?.text) return {kind: "taken", text: sent.text};
   if (!sent || !team?.state) return sent ? {kind: "waiting", text: "the goal is sent"} : null;
   const state = team.state;
   if (state.refusals > 0 && state.refused_stamp === sent.stamp) {
     return {kind: "refused", text: `the goal was refused: ${state.refusal}`};
   }
-  if (state.stamp === sent.stamp) return {kind: "taken", text: "the goal is accepted"};
+  if (state.stamp === sent.stamp) {
+    return {kind: "taken", text: state.plan_ready ? "the plan waits for Execute" : "the goal is accepted"};
+  }
   return {kind: "waiting", text: "the goal is sent"};
 }

@@ -1,6 +1,6 @@
 // The text and numbers beside the map.
 
-import {answerTo, poseOf} from "./model.js";
+import {answerTo, busy, errorOf} from "./model.js";
 import {teamColor} from "./scene.js";
 
 const at = id => document.getElementById(id);
@@ -22,12 +22,9 @@ function fill(id, key, make) {
 
 export const teamName = space => space.split("/").filter(Boolean).at(-1) ?? "all";
 
-const turn = a => Math.abs(Math.atan2(Math.sin(a), Math.cos(a)));
-
 function numbers(model, team) {
-  const state = team?.state, pose = poseOf(model, model.index.get(state?.object)), goal = state?.goal;
-  const gap = pose && goal ? `${(1e3 * Math.hypot(pose.x - goal[0], pose.y - goal[1])).toFixed(1)} mm, ` +
-    `${turn(pose.theta - goal[2]).toFixed(3)} rad` : "–";
+  const state = team?.state, error = errorOf(model, team);
+  const gap = error ? `${(1e3 * error[0]).toFixed(1)} mm, ${error[1].toFixed(3)} rad` : "–";
   const rows = [["time", model.time === null ? "–" : `${model.time.toFixed(1)} s`]];
   if (model.bodies) {
     const robots = model.bodies.type.filter(t => model.bodies.types[t].robot).length, all = model.bodies.names.length;
@@ -37,19 +34,38 @@ function numbers(model, team) {
   rows.push(["to the goal", gap]);
   if (state?.step[1]) rows.push(["step", `${state.step[0]} of ${state.step[1]}`]);
   if (state?.replans) rows.push(["new plans", `${state.replans}`]);
-  return [...rows, ...(team?.rows ?? [])];
+  const told = (team?.rows ?? []).map(r => [r.name, r.text, outside(r) ? "bad" : ""]);
+  if (told.length && !busy(team)) rows.push(["of the job that has ended:", "", "former"]);
+  return [...rows, ...told.map(([k, v, c]) => [k, v, busy(team) ? c : "former"])];
+}
+
+// Whether a value is on the far side of its limit. Margins have lower limits, errors have upper ones.
+const outside = ({name, value, limit}) => value !== undefined && limit !== undefined &&
+  (/margin|clearance/.test(name) ? value < limit : value > limit);
+
+const short = v => String(Number(v.toPrecision(3)));
+
+export function showBelief(model) {
+  const rows = model.belief.map(b => {
+    const range = b.low === b.high ? "" : ` [${short(b.low)}, ${short(b.high)}]`;
+    return [`${b.body} ${b.quantity.replaceAll("_", " ")}`, `${short(b.value)}${range} ${b.unit}`, b.source];
+  });
+  at("belief").hidden = !rows.length;
+  fill("beliefs", rows, () => rows.flatMap(([k, v, source]) => {
+    const value = element("dd", v, source === "scenario" ? "" : "said");
+    value.title = `source: ${source}`;
+    return [element("dt", k), value];
+  }));
 }
 
 // Everything but the map; trouble: why no goal is accepted, or empty.
-export function showSide(model, chosen, sent, trouble) {
+export function showSide(model, chosen, sent, trouble, jump) {
   const team = model.teams.get(chosen), state = team?.state;
   const paused = !trouble && model.suite?.paused;
   at("trouble").hidden = !trouble && !paused;
   at("trouble").className = paused ? "paused" : "";
   at("trouble").textContent = trouble || (paused ? "the suite is paused" : "");
   at("scene").className = trouble ? "gone" : "";
-  at("hint").textContent = trouble ? "no goal can be sent now"
-    : "press at the goal and drag in the direction that the object should face; Escape cancels";
   at("state").textContent = state?.state ?? (trouble ? "no job" : "waiting");
   at("state").className = state?.code ? "failed" : state?.state === "PUSHING" ? "pushing" : "";
   at("reason").textContent = state?.reason ?? "";
@@ -57,14 +73,16 @@ export function showSide(model, chosen, sent, trouble) {
     : answerTo(sent, model.teams.get(sent?.space));
   at("answer").textContent = answer?.text ?? "";
   at("answer").className = answer?.kind ?? "";
-  at("cancel").disabled = Boolean(trouble) || !state || state.state === "IDLE";
+  at("cancel").disabled = Boolean(trouble) || !state || state.state === "IDLE" && !state.plan_ready;
+  at("execute").hidden = !state?.plan_ready;
   const rows = numbers(model, team);
-  fill("numbers", rows, () => rows.flatMap(([k, v]) => [element("dt", k), element("dd", v)]));
+  fill("numbers", rows, () => rows.flatMap(([k, v, c]) => [element("dt", k, c), element("dd", v, c)]));
   const log = team?.log ?? [];
   fill("log", log, () => log.toReversed().map(([t, name, reason]) => {
-    const row = document.createElement("div"), text = document.createElement("p");
+    const row = document.createElement("button"), text = document.createElement("p");
     text.append(element("b", `${name.toLowerCase()} `), reason);
     row.append(element("span", `${t.toFixed(1)} s`), text);
+    row.title = "show this moment in the charts"; row.onclick = () => jump(t);
     return row;
   }));
 }
@@ -84,7 +102,7 @@ export function showTeams(model, chosen, choose) {
   });
   fill("teams", [lines, chosen], () => lines.map(([name, state], n) => {
     const row = element("div", "", model.spaces[n] === chosen ? "chosen" : ""), dot = element("span", "", "dot");
-    dot.style.background = teamColor(n);
+    dot.style.background = teamColor(model, n);
     row.append(dot, element("span", name), element("span", state));
     row.onclick = () => choose(model.spaces[n]);
     return row;

@@ -49,6 +49,7 @@ class Suite:
 
     def on_cancel(self, team, response):
         self.cancels[team] += 1
+        response.success, response.message = True, "canceled"
         return response
 
     def silent(self):

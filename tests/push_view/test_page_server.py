@@ -158,7 +158,7 @@ def test_streams_are_bounded_and_those_of_closed_pages_are_given_back(ros, scena
 
 
 def test_a_page_that_does_not_read_is_dropped(ros, scenario, monkeypatch):
-    monkeypatch.setattr("push_view.page_server._PATIENCE", 0.3)
+    monkeypatch.setattr("push_view.page_server.PATIENCE", 0.3)
     monkeypatch.setattr("push_view.page_server._Handler.timeout", 0.3)
     page = Page(scenario, Suite(), streams=1)
     try:

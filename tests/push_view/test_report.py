@@ -13,7 +13,7 @@ from push_record.bag import BagWriter
 from push_record.collisions import Collisions
 from push_record.contents import load
 from push_ros.conversions import contacts_to_ros, pose_stamped_to_ros, poses_to_ros, time_to_ros
-from push_view.bodies import OBJECT, ROBOT, bodies_of
+from push_view.bodies import bodies_of
 from push_view.drawing import body_vertices, moments
 from push_view.report import PRODUCTS, final_error, write_report
 from sim_bridge.world import Contact
@@ -221,9 +221,9 @@ def test_bodies_share_types_and_are_drawn_where_they_are(scenario):
     poses = {"r3": np.array([[0.0, 0.0, 0.0], [1.0, 2.0, np.pi / 2]])}
     poses["box1"] = np.full((2, 3), np.nan)
     vertices = body_vertices(bodies, poses, 1)
-    assert vertices[OBJECT] == []
+    assert vertices[bodies.colour("box1")] == []
     x, y = many.robot()[1].outline.T
-    assert vertices[ROBOT][0] == pytest.approx(np.column_stack([1.0 - y, 2.0 + x]))
+    assert vertices[bodies.colour("r3")][0] == pytest.approx(np.column_stack([1.0 - y, 2.0 + x]))
 
 
 def test_an_object_is_drawn_about_the_middle_of_its_outline(scenario):

@@ -1,0 +1,94 @@
+"""What the servers of the page share: its files, answers, and a server in a thread."""
+
+import json
+import mimetypes
+import socket
+import threading
+from collections.abc import Callable, Mapping
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any
+
+PATIENCE = 5.0
+"""[s] until a page that does not read, or a silent connection, is dropped."""
+
+SAFETY = {
+    "Cache-Control": "no-store",
+    "Content-Security-Policy": "default-src 'self'; frame-ancestors 'none'",
+    "X-Content-Type-Options": "nosniff",
+}
+"""Headers of every answer."""
+
+_NONE: Mapping[str, str] = {}
+
+
+def page_files() -> dict[str, tuple[str, bytes]]:
+    """Type and contents of the page's files by the path of a request."""
+    files = {}
+    folder = Path(__file__).parent / "page"
+    for path in sorted(p for p in folder.rglob("*") if p.is_file()):
+        kind = mimetypes.guess_type(path.name)[0] or "application/octet-stream"
+        if kind.startswith("text/"):
+            kind += "; charset=utf-8"
+        name = path.relative_to(folder).as_posix()
+        files["/" if name == "index.html" else f"/{name}"] = (kind, path.read_bytes())
+    return files
+
+
+class Answers(BaseHTTPRequestHandler):
+    """A request handler with answers; a connection that is silent is dropped."""
+
+    protocol_version = "HTTP/1.1"
+    timeout = PATIENCE
+
+    def log_message(self, *_: Any) -> None:
+        """Do not log each request."""
+
+    def json(self, code: int, data: Any) -> None:
+        """Answer with JSON."""
+        self.answer(code, "application/json", json.dumps(data).encode())
+
+    def refuse(self, code: int, why: str) -> None:
+        """Answer with a sentence of text."""
+        self.answer(code, "text/plain; charset=utf-8", f"{why}\n".encode())
+
+    def answer(self, code: int, kind: str, body: bytes, headers: Mapping[str, str] = _NONE) -> None:
+        """Answer with a body of a content type, and further headers."""
+        self.send_response(code)
+        for name, value in (("Content-Type", kind), ("Content-Length", str(len(body)))):
+            self.send_header(name, value)
+        for name, value in (*SAFETY.items(), *headers.items()):
+            self.send_header(name, value)
+        self.end_headers()
+        self.wfile.write(body)
+
+
+class _Server(ThreadingHTTPServer):
+    daemon_threads = True
+
+    def handle_error(self, *_: Any) -> None:
+        """A broken connection is not reported."""
+
+
+class BackgroundServer:
+    """Answers requests in threads of its own. port: the one that is bound.
+
+    Raises
+    ------
+    OSError: host and port cannot be bound.
+    """
+
+    def __init__(
+        self, host: str, port: int, handler: Callable[..., BaseHTTPRequestHandler]
+    ) -> None:
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        server = type("_BoundServer", (_Server,), {"address_family": family})
+        self._server: ThreadingHTTPServer = server((host, port), handler)
+        self.port = int(self._server.server_address[1])
+        self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop answering."""
+        self._server.shutdown()
+        self._server.server_close()
