@@ -16,7 +16,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("y", type=finite, help="[m] in the map frame")
     parser.add_argument("theta", type=finite, help="[rad] heading")
     parser.add_argument("--team", default="", help="name of the team, if there are several")
-    parser.add_argument("--no-wait", action="store_true")
+    parser.add_argument(
+        "--no-wait", action="store_true", help="send the goal and do not follow the job"
+    )
     add_timeout(parser, 300.0)
     add_namespace(parser)
 

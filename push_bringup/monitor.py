@@ -224,7 +224,8 @@ class Monitor:
 
     def _forgotten(self) -> JobResult:
         return self.unfinished(
-            "the node that owned the job was restarted and has forgotten it; send the goal again",
+            "the node that owned the job was restarted and does not continue it; "
+            "send the goal again",
             JobError.JOB_FORGOTTEN,
         )
 

@@ -55,7 +55,7 @@ class OneRobotMethod:
         (self._name,), self._arena, self._item = arena.robots, arena, arena.object
         self._settings: SupervisorSettings = arena.section("", SupervisorSettings)
         if not self._settings.auto_execute:
-            raise Unsuited("a method carries its plans out at once: auto_execute must be true")
+            raise Unsuited("a method executes its plans at once; auto_execute must be true")
         specs = arena.robot, arena.item
         self._near = self._around(*specs)
         settings, field = arena.section("planner", PlannerSettings), DistanceField(arena.grid)
@@ -97,9 +97,9 @@ class OneRobotMethod:
         Whether there is a plan is only known by planning."""
         goal = task.goal
         if len(task.targets) > 1 or task.times:
-            return Refusal(JobError.INVALID_GOAL, "one robot takes one goal at a time")
+            return Refusal(JobError.INVALID_GOAL, "the method 'one-robot' accepts a single goal")
         if not np.isfinite(goal).all():
-            return Refusal(JobError.INVALID_GOAL, "one robot needs the heading of its goal")
+            return Refusal(JobError.INVALID_GOAL, "the goal needs a heading")
         specs = belief.robot(self._name), belief.object(self._item)
         try:
             self._surroundings(*specs).check_goal(goal)
@@ -131,7 +131,7 @@ class OneRobotMethod:
         if self._name in seen.robots:
             return Told({self._name: command}, self._answer(seen, belief))
         if self._drive.held > self._drive.tracker.settings.give_up:
-            self.end(JobError.POSES_STALE, f"no poses of '{self._name}'")
+            self.end(JobError.POSES_STALE, f"no poses of '{self._name}' arrive")
         return Told()
 
     def _take_up(self, belief: Belief) -> None:

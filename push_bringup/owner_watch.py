@@ -2,8 +2,8 @@
 
 A node that was killed, and one that is frozen, look alike for a while: the graph loses both when
 they have not announced themselves for some seconds. A frozen one comes back as the same publisher
-and goes on with its job. One that was started in place of a dead one is another publisher, and
-knows nothing of the job. No ROS here.
+and continues its job. A restarted node is another publisher. What it publishes about the job
+decides whether the job continues. No ROS here.
 """
 
 from dataclasses import dataclass

@@ -120,7 +120,7 @@ class Suite:
             if not monitor.connect(end - time.monotonic(), self._alive):
                 self.check()
                 if self._stopping:
-                    raise SuiteFailed("stopped before the nodes were up")
+                    raise SuiteFailed("the suite was stopped before all nodes had started")
                 raise SuiteFailed(f"the nodes did not start in time: {monitor.missing()}")
 
     def _alive(self) -> bool:
@@ -208,5 +208,5 @@ def scenario_goals(scenario: Scenario) -> dict[str, Pose]:
             x, y, theta = (float(v) for v in team.goal)
             goals[team.name] = (x, y, theta)
     if not goals:
-        raise SettingsError(f"scenario '{scenario.name}' has no goal")
+        raise SettingsError(f"scenario '{scenario.name}' has no goal; add 'goal' or 'goals' to it")
     return goals

@@ -1,8 +1,9 @@
-"""The systems: which nodes make one up, for whom, and where they live.
+"""The systems: which nodes each of them consists of, whom they serve, and in which namespace.
 
-One list serves the launcher (a process a node), lockstep (all nodes in one process) and the tests.
-A further method is a system of its own without an edit here; a system of several kinds of nodes is
-a function that returns such a list, and a row in ``SYSTEMS``.
+The same list of nodes serves the launcher (one process per node), runs in lockstep (all nodes in
+one process) and the tests. An added method is a system without a change in this file. To add a
+system of several kinds of nodes, write a function that returns its list of nodes, and name the
+function in ``SYSTEMS``.
 """
 
 from collections.abc import Callable
@@ -21,24 +22,24 @@ from push_scenario.teams import Team
 from swarm_push.swarm_method import SWARM
 
 LIVE: dict[str, dict[str, Any]] = {"controller": {"tracker": {"deadline": 0.03}}}
-"""Settings of live use, where the scenario is silent. A run in lockstep must not depend on the wall
-clock: there a solve has no deadline [s]."""
+"""Defaults for real time, for settings that the scenario does not give. In lockstep a solve has no
+deadline [s], because such a run must not depend on the wall clock."""
 
 LOCKSTEP: dict[str, dict[str, Any]] = {"bridge": {"lockstep_warning": 60.0}}
-"""Settings of a run in lockstep, where the scenario is silent. All nodes are in one process, so a
-late answer [s] means a busy machine."""
+"""Defaults for lockstep, for settings that the scenario does not give. All nodes are in one
+process, so a late answer [s] only means that the machine is busy."""
 
 GROUP_MOST = 5
-"""Robots of a group at most."""
+"""Maximum number of robots in a group."""
 
 
 def teams_of(scenario: Scenario) -> tuple[Team, ...]:
-    """The teams of a scenario; the unnamed one where it names none."""
+    """The teams of a scenario. A scenario without teams has one team without a name."""
     return tuple(scenario.teams.values()) or (scenario.team(),)
 
 
 def team_space(namespace: str, team: str) -> str:
-    """Namespace of a team; that of the world for the unnamed one."""
+    """Namespace of a team. A team without a name has the namespace of the world."""
     return inside(namespace, team) if team else _absolute(namespace)
 
 
@@ -47,13 +48,13 @@ def _absolute(namespace: str) -> str:
 
 
 def single(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
-    """One robot that pushes one object, for each team; all in one world.
+    """Nodes of the system ``single``: in each team, one robot pushes one object.
 
-    A robot or object of no team stands in the way of the others.
+    All teams share one world. Robots and objects that belong to no team are obstacles.
 
     Raises
     ------
-    SettingsError: a team has not one robot, or no object.
+    SettingsError: a team does not have exactly one robot, or has no object.
     """
     world = _absolute(namespace)
     nodes = [NodeSpec("bridge", "bridge", world, world)]
@@ -61,11 +62,14 @@ def single(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
         if len(team.robots) != 1:
             whose = f"team '{team.name}'" if team.name else "its only team"
             raise SettingsError(
-                f"scenario '{scenario.name}': {whose} has {len(team.robots)} robots, the system "
-                "'single' needs one per team; list under 'teams' which robot pushes which object"
+                f"scenario '{scenario.name}': {whose} has {len(team.robots)} robots, but the "
+                "system 'single' needs one per team; list under 'teams' which robot pushes which "
+                "object"
             )
         if not team.object:
-            raise SettingsError(f"scenario '{scenario.name}' has no object to push")
+            raise SettingsError(
+                f"scenario '{scenario.name}' has no object to push; add one under 'objects'"
+            )
         robot, item, place = team.robots[0], team.object, team_space(namespace, team.name)
         prefix = f"{team.name}/" if team.name else ""
         own = inside(namespace, robot)
@@ -78,17 +82,18 @@ def single(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
 
 
 def torque(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
-    """A controller for each robot that is driven by wheel torques: it follows trajectories.
+    """Nodes of the system ``torque``: a controller for each robot with torque-driven wheels.
 
     Raises
     ------
-    SettingsError: there is no such robot.
+    SettingsError: no robot of the scenario has torque-driven wheels.
     """
     world = _absolute(namespace)
     driven = [n for n, (r, _) in scenario.robots.items() if isinstance(r.drive, TorqueDrive)]
     if not driven:
         raise SettingsError(
-            f"scenario '{scenario.name}': none of its robots is driven by wheel torques"
+            f"scenario '{scenario.name}': no robot is driven by wheel torques; the system 'torque' "
+            "needs a robot type with 'drive: {kind: torque}'"
         )
     return (
         NodeSpec("bridge", "bridge", world, world),
@@ -100,25 +105,28 @@ def torque(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
 
 
 def method(name: str, scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
-    """One node that hosts a method, for each team; all in one world.
+    """Nodes of a method: for each team, one node that runs the method. All share one world.
 
     Raises
     ------
-    SettingsError: there is no such method, or a team is not one that it can drive.
+    SettingsError: there is no such method, or it cannot command the robots of a team.
     """
     world = _absolute(namespace)
     nodes = [NodeSpec("bridge", "bridge", world, world)]
     spec = {"group": GROUP, "swarm": SWARM}.get(name) or method_spec(name)
     if spec is None:
         raise SettingsError(
-            f"no method called '{name}'; name an installed one, or MODULE:ATTRIBUTE"
+            f"there is no method '{name}'; give the name of an installed method, or "
+            "MODULE:ATTRIBUTE"
         )
     for team in teams_of(scenario):
         whose = f"scenario '{scenario.name}': " + (f"team '{team.name}'" if team.name else "it")
         if not team.robots:
-            raise SettingsError(f"{whose} has no robots")
+            raise SettingsError(f"{whose} has no robots; add at least one")
         if not team.object:
-            raise SettingsError(f"{whose} has no object to push")
+            raise SettingsError(
+                f"{whose} has no object to push; name one under 'object' or 'objects'"
+            )
         try:
             robots = {r: scenario.robots[r][0] for r in team.robots}
             spec.check(robots, scenario.objects[team.object][0])
@@ -140,7 +148,7 @@ def method(name: str, scenario: Scenario, namespace: str = "") -> tuple[NodeSpec
 
 
 def group(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
-    """Two to five robots that push one object, for each team, and a grasp optimizer.
+    """Nodes of the system ``group``: for each team, the group node and an optimizer.
 
     Raises
     ------
@@ -156,8 +164,9 @@ def group(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
 
 
 def swarm(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
-    """Any number of robots that move one object, for each team. One node moves them all, or each
-    robot has its own where ``agents.decentralised`` of ``swarm`` says so.
+    """Nodes of the system ``swarm``: for each team, the swarm node.
+
+    If the setting ``agents.decentralised`` is true, each robot has an agent node in addition.
 
     Raises
     ------
@@ -185,7 +194,11 @@ def swarm(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
 
 @dataclass(frozen=True)
 class System:
-    """nodes: lists its nodes for a scenario in a namespace. example: scenario to start it with."""
+    """A system by name.
+
+    nodes: function of a scenario and a namespace that returns the nodes. example: scenario that is
+    used if none is given.
+    """
 
     nodes: Callable[[Scenario, str], tuple[NodeSpec, ...]]
     example: str
@@ -197,11 +210,12 @@ SYSTEMS: dict[str, System] = {
     "group": System(group, GROUP.example),
     "swarm": System(swarm, SWARM.example),
 }
-"""Systems of more than one kind of node, by name. Any method is a system too, of its one node."""
+"""The systems that are listed in this file, by name. Every method is also a system, which consists
+of the bridge and the node of the method."""
 
 
 def system_of(name: str) -> System:
-    """A system by its name, or that of a method by its name or ``module:ATTRIBUTE``.
+    """A system by its name; also a method, by its name or as ``module:ATTRIBUTE``.
 
     Raises
     ------
@@ -213,13 +227,14 @@ def system_of(name: str) -> System:
     if spec is None:
         known = ", ".join(system_names())
         raise SettingsError(
-            f"no system called '{name}'; expected one of: {known}, or MODULE:ATTRIBUTE of a method"
+            f"there is no system '{name}'; expected one of: {known}, "
+            "or MODULE:ATTRIBUTE of a method"
         )
     return System(partial(method, name), spec.example)
 
 
 def system_names() -> tuple[str, ...]:
-    """Names of all systems, those of installed methods among them."""
+    """Names of all systems, including those of installed methods."""
     return tuple(dict.fromkeys((*SYSTEMS, *method_names())))
 
 
@@ -228,7 +243,8 @@ def nodes_of(system: str, scenario: Scenario, namespace: str = "") -> tuple[Node
 
     Raises
     ------
-    SettingsError: there is no such system, the scenario does not suit it, or the namespace is none.
+    SettingsError: there is no such system, the scenario does not fit it, or the namespace is not a
+        valid ROS namespace.
     """
     found = system_of(system)
     check_namespace(namespace)
@@ -236,7 +252,10 @@ def nodes_of(system: str, scenario: Scenario, namespace: str = "") -> tuple[Node
 
 
 def check_namespace(namespace: str) -> None:
-    """Raise SettingsError for what ROS would not take: names of letters, digits, underscores."""
+    """Raise SettingsError if ROS would not accept a namespace.
+
+    Each part must consist of letters, digits and underscores, and must not begin with a digit.
+    """
     for part in namespace.strip("/").split("/") if namespace.strip("/") else []:
         if not (part.isascii() and part.isidentifier()):
             raise SettingsError(
@@ -246,6 +265,6 @@ def check_namespace(namespace: str) -> None:
 
 
 def recorder(out: str, namespace: str = "") -> NodeSpec:
-    """A recorder of the world in a namespace and of all its teams; out: bag folder."""
+    """The recorder node for a world and all its teams. out: folder of the bag."""
     world = _absolute(namespace)
     return NodeSpec("recorder", "recorder", world, world, parameters={"out": out})

@@ -1,11 +1,12 @@
 """The protocol of a method: an algorithm that moves one object with the robots of a team.
 
-A method imports no ROS and reads no clock; it knows only its arguments. The group, the swarm with
-any law and the rivals of the studies are methods. ``push_ros/method_node.py`` runs one as a node,
-a study runs it in lockstep, and a notebook steps it::
+A method imports no ROS and reads no clock. Its only inputs are the arguments of its calls. The
+group, the swarm with any law, the one robot and the rivals of the studies are methods.
+``push_ros/method_node.py`` runs a method as a node, and a study runs that node in lockstep. A
+notebook calls the method itself::
 
     method = SPEC.make(arena)
-    method.begin(Task((goal,)), 0.0)
+    method.begin(Task((goal,)), belief)
     while method.status.phase != JobPhase.IDLE:
         told = method.step(world.seen(), belief)
         world.step(told.commands)

@@ -201,7 +201,7 @@ class PlannerNode(Node):
         if len(circles) and circles[:, 2].min() < 0.0:
             raise InvalidMessage("an obstacle's radius must not be negative")
         if request.mode not in (PlanPush.Goal.DIRECT, PlanPush.Goal.PREEMPTIVE):
-            raise InvalidMessage(f"unknown mode {request.mode}")
+            raise InvalidMessage(f"unknown mode {request.mode}; expected DIRECT or PREEMPTIVE")
         preemptive = request.mode == PlanPush.Goal.PREEMPTIVE
         self._draws += preemptive
         return plan_among_bodies(planner, start, goal, circles, self._draws * preemptive)

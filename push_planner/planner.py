@@ -88,7 +88,8 @@ class _Guides:
             pass
         if not self._found:
             raise PlanningFailed(
-                PlanError.NO_GUIDE_PATH, "no path was found on which the object would fit"
+                PlanError.NO_GUIDE_PATH,
+                "no path was found along which the object fits; choose another goal",
             )
         return self._found[number % len(self._found)]
 
@@ -306,12 +307,13 @@ class PushPlanner:
             if error.widest == 0.0:
                 raise PlanningFailed(
                     PlanError.NO_GUIDE_PATH,
-                    "obstacles separate start and goal: no way connects them",
+                    "obstacles separate start and goal, and no way connects them; "
+                    "choose another goal",
                 ) from None
             raise PlanningFailed(
                 PlanError.NO_GUIDE_PATH,
                 f"the widest way from start to goal is {2.0 * error.widest:.3f} m wide on the map, "
-                f"the object needs {2.0 * least:.3f} m",
+                f"but the object needs {2.0 * least:.3f} m; widen it, or choose another goal",
             ) from None
 
     def segment(self, step: PushStep) -> PushSegment:

@@ -63,13 +63,14 @@ def preemptive_pushes(
 def plan_after_preemptive_push(
     planner: PushPlanner, start: Array, goal: Array, seed: int
 ) -> Iterator[Progress]:
-    """Plan in slices like ``PushPlanner.plan``, from the end of one pre-emptive push after another.
+    """Plan in slices like ``PushPlanner.plan``, with a pre-emptive push first.
 
-    The first from whose end there is a plan is the first push of every plan that is reported.
+    The pre-emptive pushes are tried one after the other. The plans that are reported begin with the
+    first of them from whose end a plan is found.
 
     Raises
     ------
-    PlanningFailed: when none leads anywhere; from the ``next`` that finds it out.
+    PlanningFailed: no plan was found after any of them; raised by the last ``next``.
     """
     planner.check(start, "start", PlanError.START_OCCUPIED)
     planner.check(goal, "goal", PlanError.GOAL_OCCUPIED)
@@ -88,7 +89,7 @@ def plan_after_preemptive_push(
                 yield Progress(f"{stage}: {progress.stage}", whole)
             return
         except PlanningFailed as error:
-            failure = f"from the last of their ends: {error}"
+            failure = f"planning after the last of them failed: {error}"
     raise PlanningFailed(
         PlanError.NO_PUSH_SEQUENCE,
         f"none of {len(offers)} pre-emptive pushes opens a way to the goal; {failure}",

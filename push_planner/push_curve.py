@@ -282,7 +282,10 @@ def shortest_push_curve(
     The shortest curve found, feasible on 321 samples, or None when none was found.
     """
     if not curvature_min < 0.0 < curvature_max:
-        raise ValueError(f"limits must enclose 0, got [{curvature_min}, {curvature_max}]")
+        raise ValueError(
+            "the curvature limits must enclose 0 (minimum < 0 < maximum), got "
+            f"[{curvature_min}, {curvature_max}] 1/m"
+        )
     c, s = math.cos(start[2]), math.sin(start[2])
     dx, dy = end[0] - start[0], end[1] - start[1]
     turn = end[2] - start[2]

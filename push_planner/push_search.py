@@ -1,13 +1,13 @@
-"""Layer 2: A* over object poses and pushing sides, Algorithms 1 and 2.
+"""Layer 2: A* over object poses and pushed sides, in place of Algorithms 1 and 2.
 
-The search runs backward from the goal, as in the thesis. A node is an object pose and the side on
-which the push that starts there pushes; its parent is nearer to the goal.
+The search runs backward from the goal, as in the thesis. A node consists of an object pose and of
+the side of the push that begins there. The parent of a node is one push closer to the goal.
 
-Algorithm 2 makes every push into a node before it looks at the next one, and stops after the
-farthest few. Here no push is lost, and few are made: all pushes into a node are guessed
-(rough_cost.py), and only the one that looks best in the whole queue is solved and swept (lazy
-weighted A*). What has been found out about a push is kept, for all nodes that it could lead to
-and for the guesses of later searches.
+The printed Algorithm 2 computes the curves of pushes into a node, and stops at the first starting
+pose from which one succeeds. It thereby loses plans. Here the costs of all pushes into a node are
+estimated first (rough_cost.py). The curve and the swept area of a push are computed only when its
+estimate is the best in the whole queue (lazy weighted A*). The result of a push is stored. It
+serves all nodes that the push may lead to, and the estimates of later searches.
 """
 
 import heapq
@@ -33,7 +33,11 @@ _SLICE = 20  # pushes tried between two reports
 
 @dataclass
 class SearchStatistics:
-    """Work of one search."""
+    """Counts of the work of one search.
+
+    expanded: entries of the queue that were processed. generated: nodes that were added to it.
+    solved: push curves that were computed. feasible: curves that exist and are free of collisions.
+    """
 
     expanded: int = 0
     generated: int = 0
@@ -43,9 +47,11 @@ class SearchStatistics:
 
 @dataclass(frozen=True)
 class PushStep:
-    """One push of a sequence: side, curve, object poses before and after, clearance [m].
+    """One push of a sequence.
 
-    Poses ``(3,)`` of the object's centre of mass.
+    side: the pushed side. curve: path of the robot's axle midpoint. object_start, object_end:
+    ``(3,)`` [m, m, rad] poses of the object's centre of mass, world frame. clearance: [m] of robot
+    and object to obstacles along the push.
     """
 
     side: PushSide
@@ -57,7 +63,13 @@ class PushStep:
 
 @dataclass
 class SearchNode:
-    """An object pose, by its number in the graph, and the side that is pushed there."""
+    """An object pose, with the side of the push that begins there.
+
+    pose: number of the pose in the graph. side: number of the side, -1 at the goal. cost: [m] from
+    here to the goal, g of (2.10). parent: the node at which the push ends. step: that push.
+    estimates, states: pushes that end at this node, from ``PushGraph.pushes_into``; None until the
+    node is expanded. tried: how many of them have been taken.
+    """
 
     pose: int
     side: int  # on which the push that starts here pushes; -1 at the goal
@@ -70,11 +82,23 @@ class SearchNode:
 
 
 class PushGraph:
-    """Object poses, what pushes between them would cost, and those pushes that have been tried."""
+    """Object poses, estimated costs of the pushes between them, and the pushes that were computed.
+
+    The first pose is the start, the last one is the goal, and the others are ordered along Gamma.
+    """
 
     def __init__(
         self, scene: PushScene, start: Array, goal: Array, candidates: Candidates, reach: float
     ) -> None:
+        """Build the graph.
+
+        Parameters
+        ----------
+        scene: robot, object and map.
+        start, goal: ``(3,)`` [m, m, rad] poses of the object's centre of mass, world frame.
+        candidates: poses of the object between start and goal.
+        reach: [m] longest distance along Gamma that one push may cover.
+        """
         self.scene = scene
         order = np.argsort(candidates.way, kind="stable")
         self.poses = np.vstack([start, candidates.poses[order], goal])
@@ -120,7 +144,10 @@ class PushGraph:
         self._pushes: dict[tuple[int, int, int], PushStep | None] = {}
 
     def rough_costs(self, bound: float) -> tuple[Array, float]:
-        """Guessed cost [m] to come to each state ``(n, sides)``, and that of a plan."""
+        """Estimated cost [m] from the start to each state ``(n, sides)``, and of a whole plan [m].
+
+        bound: [m] states whose estimate exceeds it are left out.
+        """
         ready, arrived = rough_costs(
             self.poses,
             self.robots,
@@ -134,7 +161,10 @@ class PushGraph:
         return ready, float(arrived[-1].min())
 
     def leave(self, statistics: SearchStatistics, enough: float = math.inf) -> int:
-        """Try pushes out of the start, until ``enough`` are found; how many are."""
+        """Compute pushes that begin at the start, until ``enough`` are feasible.
+
+        Returns the number of feasible pushes. Adds the work to the statistics.
+        """
         found = 0
         for side in range(len(self.scene.sides)):
             for pose in range(1, self.window[0, 1]):
@@ -145,7 +175,10 @@ class PushGraph:
         return found
 
     def worth_leaving_for(self, side: int, pose: int) -> bool:
-        """Whether a push out of the start to the pose has room at both ends and need not loop."""
+        """Whether a push from the start to a pose is worth computing.
+
+        The robot must have room at both ends, and the push must not have to make a loop.
+        """
         if not (self.room[side, 0] and self.room[side, pose]):
             return False
         (ax, ay, _, ac, sa), (bx, by, _, bc, sb) = self.robots[side, 0], self.robots[side, pose]
@@ -155,7 +188,10 @@ class PushGraph:
     def pushes_into(
         self, pose: int, following: int, cost: float, weight: float, bound: float, ready: Array
     ) -> Any:
-        """Estimates of plans through a push that ends at the pose, and where it starts."""
+        """Estimated costs of plans through the pushes that end at a pose, and where these begin.
+
+        Arguments and result are those of ``rough_cost.pushes_into``.
+        """
         return pushes_into(
             pose,
             following,
@@ -173,7 +209,10 @@ class PushGraph:
         )
 
     def side_change(self, pose: int, before: int, after: int) -> float:
-        """[m] cost of pushing on another side than the push that ended at the pose."""
+        """Cost [m] of changing from one side to another at a pose; 0 if the side is the same.
+
+        before, after: numbers of the sides; -1 for ``after`` if no push follows.
+        """
         if after < 0 or before == after:
             return 0.0
         way = self.robots[before, pose, :2] - self.robots[after, pose, :2]
@@ -182,7 +221,10 @@ class PushGraph:
     def push(
         self, first: int, last: int, side: int, statistics: SearchStatistics
     ) -> PushStep | None:
-        """The push on a side from pose to pose, or None where there is none that is free."""
+        """The push on a side from one pose to another; computed once and then stored.
+
+        None if there is no curve within the curvature limits, or if it is not free of collisions.
+        """
         key = (first, last, side)
         if key not in self._pushes:
             statistics.solved += 1
@@ -209,11 +251,12 @@ class PushGraph:
 
 @dataclass
 class PushSearch:
-    """A search among the poses of a graph; ``run`` yields now and then, and ends with the best.
+    """A search among the poses of a graph. ``run`` does the work in slices.
 
-    bound: cost [m] that a solution must stay below. weight: of the guess of what lies before a
-    push, >= 1. expansions: how many pushes may be tried. exhausted: whether all pushes
-    that could be part of one have been tried. solution, cost: what was found.
+    bound: [m] a solution must cost less. weight: factor (>= 1) of the estimated cost from the start
+    to a push. expansions: number of pushes that may be tried. expanded: number that were tried.
+    exhausted: whether all pushes that could be part of a solution were tried. solution: the pushes
+    in their order, None if none was found. cost: [m] of the solution.
     """
 
     graph: PushGraph
@@ -226,7 +269,7 @@ class PushSearch:
     cost: float = math.inf
 
     def run(self, statistics: SearchStatistics) -> Iterator[None]:
-        """Algorithm 1; adds to the statistics."""
+        """Search (Algorithm 1). Yields after each slice, and adds its work to the statistics."""
         graph = self.graph
         ready, estimate = graph.rough_costs(self.bound)
         yield
@@ -282,7 +325,7 @@ class PushSearch:
         self.exhausted = not queue
 
     def _try_single_push(self, statistics: SearchStatistics) -> None:
-        """One push from start to goal, where there is one, is what others must be better than."""
+        """Try one push from start to goal. If there is one, other plans must cost less."""
         graph = self.graph
         for side in range(len(graph.scene.sides)):
             if graph.worth_leaving_for(side, len(graph.poses) - 1):
@@ -294,7 +337,7 @@ class PushSearch:
 
 
 def trace(node: SearchNode) -> tuple[PushStep, ...]:
-    """The pushes from a node to the goal, in their order."""
+    """The pushes from a node to the goal, in the order in which they are executed."""
     steps = []
     while node.parent is not None:
         assert node.step is not None

@@ -1,4 +1,6 @@
-"""Why an object cannot be pushed from start to goal: what is known, and what was only not found.
+"""Reasons why an object cannot be pushed from start to goal.
+
+A reason that is certain is distinguished from a search that found no plan.
 
 Poses ``(3,)`` are of the object's geometric frame.
 """
@@ -25,8 +27,8 @@ def check_pose(scene: PushScene, pose: Array, what: str, occupied: PlanError) ->
         x0, x1, y0, y1 = grid.extent
         raise PlanningFailed(
             PlanError.OUTSIDE_MAP,
-            f"the {what} {_told(pose)} lies outside the map, x in [{x0:.2f}, {x1:.2f}], "
-            f"y in [{y0:.2f}, {y1:.2f}] m",
+            f"the {what} {_told(pose)} lies outside the map, which covers "
+            f"x in [{x0:.2f}, {x1:.2f}] and y in [{y0:.2f}, {y1:.2f}] m",
         )
     if scene.object_clearance(scene.item.mass_pose(pose)) <= 0.0:
         raise PlanningFailed(
@@ -35,7 +37,7 @@ def check_pose(scene: PushScene, pose: Array, what: str, occupied: PlanError) ->
 
 
 def check_room(scene: PushScene, pose: Array, what: str, leaving: bool = False) -> None:
-    """Raise PlanningFailed when the robot has room at no side of the object at the pose."""
+    """Raise PlanningFailed if the robot has no room behind any side of the object at the pose."""
     centre = scene.item.mass_pose(pose)
     needed = scene.leaving(centre) if leaving else scene.settings.safety_distance
     clearance = scene.object_clearance(centre)
@@ -43,7 +45,8 @@ def check_room(scene: PushScene, pose: Array, what: str, leaving: bool = False) 
         raise PlanningFailed(
             PlanError.NO_PUSH_SEQUENCE,
             f"the object cannot be {what} {_told(pose)}: it is {1e3 * clearance:.1f} mm from an "
-            f"obstacle there, and pushes keep {1e3 * needed:.1f} mm",
+            f"obstacle there, but pushes keep {1e3 * needed:.1f} mm; move the object away from the "
+            "obstacle, or lower safety_distance",
         )
     if not scene.sides:
         raise PlanningFailed(
@@ -51,13 +54,15 @@ def check_room(scene: PushScene, pose: Array, what: str, leaving: bool = False) 
             f"no side of the object can be pushed: {scene.why_no_sides()}",
         )
     if not any(scene.has_room(s.robot_pose(centre), s, needed) for s in scene.sides):
-        behind = ", ".join(f"{s.index} ({1e3 * scene.backs(s)[1]:.0f} mm)" for s in scene.sides)
+        behind = ", ".join(
+            f"{1e3 * scene.backs(s)[1]:.0f} mm behind side {s.index}" for s in scene.sides
+        )
         around = 1e3 * scene.robot_keeps(needed)
         raise PlanningFailed(
             PlanError.NO_PUSH_SEQUENCE,
-            f"no side of the object can be {what} {_told(pose)}: the robot needs {around:.1f} mm "
-            "around it and room to back off, and would touch an obstacle behind each side that "
-            f"can be pushed: sides {behind}",
+            f"no side of the object can be {what} {_told(pose)}: behind each side the robot "
+            f"would touch an obstacle. It needs a clearance of {around:.1f} mm and room to back "
+            f"off: {behind}. Clear this space, or choose another pose",
         )
 
 
@@ -70,21 +75,22 @@ def why_not(
     poses: int,
     widest: float,
 ) -> str:
-    """What searches without a plan have found out, and no more than that.
+    """What the searches have found out if they ended without a plan.
 
     ways: whether any push was found that leaves the start, and any that ends at the goal. poses:
-    how many of the object were tried. widest: [m] clearance of the widest guide path found.
+    number of object poses that were tried. widest: [m] clearance of the widest guide path found.
     """
-    tried = f"of {statistics.solved} pushes tried, {statistics.feasible} are free of collisions"
+    solved, feasible = statistics.solved, statistics.feasible
+    tried = f"of {solved} pushes that were tried, {feasible} are free of collisions"
     for found, pose, what in (
         (ways[0], start, "away from the start"),
         (ways[1], goal, "to the goal"),
     ):
         if not found:
-            return f"no push {what} {_told(pose)} was found; {tried}"
+            return f"no push {what} {_told(pose)} was found; {tried}; clear the space there"
     needed = 2e3 * (origin_floor(scene.shape) + scene.settings.safety_distance)
     return (
         f"no sequence of pushes from start to goal was found among {poses} poses of the object; "
         f"{tried}; the widest way that was searched is {2e3 * widest:.0f} mm wide at its narrowest "
-        f"place, the object needs at least {needed:.0f} mm"
+        f"place, and the object needs at least {needed:.0f} mm"
     )

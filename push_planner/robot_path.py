@@ -69,7 +69,8 @@ def plan_robot_path(
         if room < least:
             raise NoRobotPath(
                 code,
-                f"{what} too close to an obstacle: {(room + body) * field.spacing:.3f} m of "
+                f"{what} too close to an obstacle: its distance is "
+                f"{(room + body) * field.spacing:.3f} m, but the radius of the robot is "
                 f"{robot.body_radius:.3f} m",
             )
     ends = reliefs(field.values, capsules, body, need, least, tips)
@@ -77,7 +78,7 @@ def plan_robot_path(
     if not len(way):
         raise NoRobotPath(
             RobotPathError.NO_PATH,
-            "no path of the robot connects start and goal: it needs a passage of "
+            "no path of the robot connects start and goal; the robot needs passages of at least "
             f"{2.0 * (robot.footprint_radius + settings.safety_distance):.3f} m",
         )
     points = np.vstack([start[:2], way[1:-1] * field.spacing + field.args[:2], goal[:2]])

@@ -1,13 +1,17 @@
-"""What plans would cost if every push that seems possible could be made: the guess that leads A*.
+"""Estimated costs of plans, computed without push curves: the heuristic of the A* search.
 
-A state is an object pose and a side that is ready to push there. From a pose a push on a side leads
-to every other pose at which the robot has room, if its chord is as long as the turn needs
-(shortest_chord.py). Its cost is guessed from the chord and from the angles at both ends. Three
-cubics between the same ends stand for the push: where the object could not pass along any of them
-in any orientation, the push is guessed to take a detour, or not to be there.
-Dijkstra's algorithm over all pairs of poses then costs less than a few hundred push curves, and it
-knows what the distance along Gamma does not: which headings the stable curvatures can reach, how
-many pushes that takes, what the changes of side add, and which pushes end at a wall.
+A state is an object pose, with a side at which the robot is ready to push. A push on a side leads
+from one pose to another one if the robot has room at both, and if the chord between them is long
+enough for the change of heading (shortest_chord.py). The length of the push is estimated from the
+chord and from the angles at both ends.
+
+Three cubics between the same ends represent the push. Where the object fits along none of them in
+any orientation, a detour is added to the estimate, or the push is ruled out.
+
+Dijkstra's algorithm then runs over all pairs of poses that are not too far apart along Gamma. It
+takes less time than a few hundred push curves. In contrast to the distance along Gamma, the
+estimate contains which headings the stable curvatures can reach, how many pushes are necessary, the
+cost of changing the side, and pushes that walls block.
 """
 
 import heapq
@@ -27,7 +31,7 @@ _THICK = 0.1  # [m] of a cubic through obstacles that no push avoids
 _TANGENTS = (1.0, 0.5, 1.6)  # of the cubics, over the chord; those of pushes are 0.3 to 2.6
 _DETOUR = 0.6  # [m] guessed for such a cubic; less for one that only cuts a corner
 BLOCKED = 101
-"""In ``sight``: a push that is not there, by its cubic or because it has been tried."""
+"""Value in ``sight`` of a push that is ruled out, by its cubics or because it was tried in vain."""
 _SURE = 0.93  # of the shortest chord in the table, which is interpolated
 
 
@@ -43,10 +47,16 @@ def guessed_length(
     sb: float,
     chords: Any,
 ) -> float:
-    """[m] of a push from a to b, poses as x, y, cosine, sine; inf where it would have to loop.
+    """Estimated length [m] of a push between two robot poses a and b.
 
-    chords: the table of shortest chords. The length is that of the cubic whose slopes over the
-    chord are small.
+    It is infinite if the push would have to make a loop. Otherwise it is the length of a cubic with
+    small slopes relative to its chord.
+
+    Parameters
+    ----------
+    ax, ay, ac, sa: [m] position of the robot at the start, cosine and sine of its heading.
+    bx, by, bc, sb: the same at the end.
+    chords: ``(k, k)`` [m] table of minimum chord lengths, see ``shortest_chords``.
     """
     dx, dy = bx - ax, by - ay
     square = dx * dx + dy * dy
@@ -75,10 +85,13 @@ def _crossed(
     oy: float,
     scale: float,
 ) -> float:
-    """How much of the object's way on the cubic from robot pose a to robot pose b is nearer to
-    obstacles than ``least``: a fraction of ``_THICK``, 1 at most.
+    """Length of the object's path that is closer to obstacles than ``least`` [m].
 
-    tangent: of the cubic at both ends, over its chord. grasp: x, y of the object.
+    The path is that of the cubic from robot pose a to robot pose b. The length is given as a
+    fraction of ``_THICK``, and is 1 at most.
+
+    tangent: length of the tangents at both ends, relative to the chord. grasp: x, y [m] of the
+    object in the robot frame.
     """
     dx, dy = b[0] - a[0], b[1] - a[1]
     chord_length = math.hypot(dx, dy)
@@ -119,7 +132,10 @@ def _guess(
     oy: float,
     scale: float,
 ) -> float:
-    """Guessed length [m] of the push from pose i to pose j; sight remembers what is crossed."""
+    """Estimated length [m] of the push from pose i to pose j, with the detour around obstacles.
+
+    ``sight`` stores how much of the path obstacles block, so that it is computed only once.
+    """
     a, b = robots[side, i], robots[side, j]
     length = guessed_length(a[0], a[1], a[3], a[4], b[0], b[1], b[3], b[4], chords[side])
     if length < math.inf:
@@ -157,25 +173,31 @@ def rough_costs(
     oy: float,
     scale: float,
 ) -> Any:
-    """Guessed cost [m] to come from the first pose to every state; the last pose is the goal.
+    """Estimated cost [m] from the first pose to every state, by Dijkstra's algorithm.
+
+    All poses are in the world frame. The first pose is the start, the last one is the goal.
 
     Parameters
     ----------
-    poses: ``(n, 3)`` of the object.
-    robots: ``(sides, n, 5)`` x, y, theta, cosine, sine of the robot in contact.
-    room: ``(sides, n)`` whether the robot can come to that contact.
-    chords: ``(sides, k, k)`` [m] tables of shortest chords. grasps: ``(sides, 3)`` of the object in
-        the robot frame.
-    bound: [m] states whose guess and distance to the goal exceed it are left out.
-    window: ``(n, 2)`` of each pose, the first and one past the last one that it has pushes with.
-    sight: ``(sides, n, widest window)`` int8, zeros at first: what is known of the pushes.
-    least: [m] distances that the object keeps from obstacles on pushes out of the first pose, and
-        on all others.
+    poses: ``(n, 3)`` [m, m, rad] of the object's centre of mass.
+    robots: ``(sides, n, 5)`` x, y [m], theta [rad], cosine, sine of the robot in contact.
+    room: ``(sides, n)`` whether the robot can reach this contact.
+    chords: ``(sides, k, k)`` [m] tables of minimum chord lengths.
+    grasps: ``(sides, 3)`` poses of the object in the robot frame.
+    push_cost, change_cost: [m] additional cost of each push, and of each change of side.
+    bound: [m] states are left out if their estimate plus their distance to the goal exceeds it.
+    window: ``(n, 2)`` for each pose, the range of poses (first, one past the last) to which it may
+        be connected by a push.
+    sight: ``(sides, n, widest window)`` int8, what is known about the pushes; all zeros at first.
+    least: ``(2,)`` [m] distance that the centre of mass keeps from obstacles, on pushes out of the
+        first pose and on all other pushes.
+    field, ox, oy, scale: distance field of the map, and the transformation into its cells.
 
     Returns
     -------
-    ready ``(n, sides)``: cost until the robot is ready to push on that side; arrived
-    ``(n, sides)``: until a push on that side has ended there; inf where there is no way.
+    ready: ``(n, sides)`` cost until the robot is ready to push on this side.
+    arrived: ``(n, sides)`` cost until a push on this side has ended at the pose.
+    Both are infinite where no sequence of pushes leads to the state.
     """
     n, sides = poses.shape[0], robots.shape[0]
     goal = n - 1
@@ -240,18 +262,30 @@ def pushes_into(
     bound: float,
     window: Any,
     sight: Any,
-    least: float,
+    least: Any,
     field: Any,
     ox: float,
     oy: float,
     scale: float,
     ready: Any,
 ) -> Any:
-    """Pushes that end at pose j, followed by a push on a side (-1: none), best first.
+    """Pushes that end at pose j, in the order of the estimated cost of the whole plan.
 
-    cost: [m] from pose j on. Returns estimates of the whole plan's cost [m], with what lies before
-    the push weighted, and states i * sides + s; those whose plain guess exceeds the bound are left
-    out.
+    Parameters
+    ----------
+    j: number of the pose.
+    following: side of the push that begins at pose j; -1 if there is none.
+    cost: [m] of the plan from pose j to the goal.
+    weight: factor of the estimated cost from the start to the beginning of the push.
+    least: [m] distances to obstacles, see ``rough_costs``.
+    ready: ``(n, sides)`` [m] from ``rough_costs``.
+    The other arguments are those of ``rough_costs``.
+
+    Returns
+    -------
+    estimates: ``(m,)`` [m] of the cost of the whole plan, with the weight.
+    states: ``(m,)`` numbers ``i * sides + s`` of the pose i and the side s at which a push begins.
+    Pushes whose estimate without the weight exceeds the bound are left out.
     """
     n, sides = poses.shape[0], robots.shape[0]
     estimates = np.empty(n * sides)

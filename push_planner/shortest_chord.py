@@ -1,13 +1,17 @@
-"""How far apart the ends of a push must be: the shortest chord over which a cubic can turn so much.
+"""Minimum distance between the two ends of a push, given the headings at both ends.
 
-Whether there is a push curve, (2.2)-(2.7), depends on three numbers and the curvature limits: the
-length d of its chord, the angle a from the first heading to the chord, and the angle b from the
-chord to the last heading. A curve made k times as large bends k times less. So for each a and b
-there is one least d, and it is the least over all cubics of unit chord of the greatest curvature
-relative to the limits. Read backward in a mirror a curve keeps its curvature and swaps a and b.
+The chord of a push is the straight line between the ends of its curve. Whether a push curve
+(2.2)-(2.7) exists depends on the curvature limits and on three numbers: the length d of the chord,
+the angle a from the first heading to the chord, and the angle b from the chord to the last heading.
 
-A table over a and b takes hundredths of a second to make, and a look into it costs less than a
-thousandth of a push curve.
+A curve that is scaled by a factor k has a curvature that is k times smaller. For each pair (a, b)
+there is therefore a minimum length d. It equals the smallest value, over all cubics with a chord of
+length 1, of the greatest curvature relative to its limit. A curve that is mirrored and traversed
+backward has the same curvature, and its angles a and b are exchanged. The table is therefore
+symmetric.
+
+Computing a table over a and b takes some hundredths of a second. Looking a value up takes less than
+a thousandth of the time of a push curve.
 """
 
 import math
@@ -21,7 +25,7 @@ from push_model.arrays import Array
 from push_planner.push_curve import basis_rows
 
 WIDEST = 2.0
-"""[rad] greatest angle of either heading to the chord; beyond, a push has to loop."""
+"""[rad] Largest angle between a heading and the chord. With a larger one a push makes a loop."""
 _TOP = math.tan(0.5 * WIDEST)  # of the table's axes, tangents of half angles
 _NODES = 33  # on each axis
 _SAMPLES = 25  # of a cubic
@@ -38,7 +42,10 @@ _BASIS = basis_rows(_SAMPLES)
 def _worst(
     ki: float, kf: float, x: float, y: float, c: float, s: float, low: float, basis: Any
 ) -> float:
-    """Greatest curvature of a cubic over its limits, 1 to the left and ``low`` to the right."""
+    """Greatest curvature of a cubic relative to its limits.
+
+    The limits are 1 to the left and ``low`` (negative) to the right.
+    """
     worst = 0.0
     for i in range(basis.shape[0]):
         dx = basis[i, 0] * x + basis[i, 1] * kf * c + basis[i, 2] * ki
@@ -53,8 +60,11 @@ def _worst(
 
 @numba.njit(cache=True, fastmath=True)
 def _least_worst(a: float, b: float, low: float, basis: Any) -> float:
-    """Least greatest curvature over all cubics of unit chord: from the best of a grid downhill, and
-    from tangents as long as the chord."""
+    """Smallest value of ``_worst`` over all cubics with a chord of length 1.
+
+    A compass search begins at the best point of a grid, and another one at tangents as long as the
+    chord.
+    """
     x, y, c, s = math.cos(a), math.sin(a), math.cos(a + b), math.sin(a + b)
     ratio = math.log(_MOST_K / _LEAST_K) / (_GRID - 1)
     best, first_i, first_f = 1e18, 1.0, 1.0
@@ -103,17 +113,36 @@ def _relative(right: float) -> Array:
 
 
 def shortest_chords(curvature_min: float, curvature_max: float) -> Array:
-    """The table ``(n, n)`` [m] for curvature limits [1/m], below and above 0; see ``chord``."""
+    """Table of minimum chord lengths, to be read with ``chord``.
+
+    Parameters
+    ----------
+    curvature_min, curvature_max: [1/m] curvature limits to the right (< 0) and to the left (> 0).
+
+    Returns
+    -------
+    ``(n, n)`` [m]. The axes are the tangents of half the angles a and b.
+
+    Raises
+    ------
+    ValueError: the limits do not enclose 0.
+    """
     if not curvature_min < 0.0 < curvature_max:
-        raise ValueError(f"limits must enclose 0, got [{curvature_min}, {curvature_max}]")
+        raise ValueError(
+            "the curvature limits must enclose 0 (minimum < 0 < maximum), got "
+            f"[{curvature_min}, {curvature_max}] 1/m"
+        )
     return _relative(round(curvature_min / curvature_max, 2)) / curvature_max
 
 
 @numba.njit(cache=True, fastmath=True, inline="always")
 def chord(table: Any, start: float, end: float) -> float:
-    """[m] shortest chord between two headings, interpolated.
+    """Minimum length [m] of the chord between two headings, interpolated in a table.
 
-    start, end: tangents of half the angles to and from the chord, of ``WIDEST`` at most.
+    Parameters
+    ----------
+    table: from ``shortest_chords``.
+    start, end: tangents of half the angles a and b. Both angles are at most ``WIDEST``.
     """
     scale = 0.5 * (_NODES - 1)
     u, v = scale * (start / _TOP + 1.0), scale * (end / _TOP + 1.0)

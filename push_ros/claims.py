@@ -69,7 +69,9 @@ def claim_domain() -> int:
         _claims[domain] = file
         os.environ["ROS_DOMAIN_ID"] = str(domain)
         return domain
-    raise RuntimeError("all hundred ROS domains for lockstep runs are in use")
+    raise RuntimeError(
+        "all hundred ROS domains for lockstep runs are in use; wait until another run has ended"
+    )
 
 
 def release_domain(domain: int) -> None:

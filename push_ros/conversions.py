@@ -77,7 +77,7 @@ def poses_from_ros(
     """
     columns = [np.asarray(a, dtype=np.float64) for a in (message.x, message.y, message.theta)]
     if {len(c) for c in columns} != {len(message.names)}:
-        raise InvalidMessage("a frame's arrays must have the same length")
+        raise InvalidMessage("the arrays of a Poses message must have the same length")
     table = np.column_stack(columns)
     poses: dict[str, Array] = {}
     refused = []
@@ -157,7 +157,7 @@ def trajectory_from_ros(message: TrajectoryMessage) -> Trajectory:
         for n in ("time", "x", "y", "theta", "v", "omega")
     ]
     if len({len(c) for c in columns}) != 1:
-        raise InvalidMessage("a trajectory's arrays must have the same length")
+        raise InvalidMessage("the arrays of a trajectory must have the same length")
     try:
         return Trajectory(columns[0], np.column_stack(columns[1:4]), np.column_stack(columns[4:]))
     except ValueError as error:
@@ -196,13 +196,18 @@ def grid_from_ros(message: GridMessage) -> OccupancyGrid:
     rows, columns = int(info.height), int(info.width)
     data = np.asarray(message.data, dtype=np.int8)
     if rows < 3 or columns < 3 or data.size != rows * columns:
-        raise InvalidMessage(f"a map of {rows} x {columns} cells with {data.size} values")
+        raise InvalidMessage(
+            "a map must have at least 3 x 3 cells and one value for each cell, got "
+            f"{rows} x {columns} cells and {data.size} values"
+        )
     if not 1e-3 <= info.resolution <= 10.0:
-        raise InvalidMessage(f"a map needs a positive resolution, got {info.resolution} m")
+        raise InvalidMessage(
+            f"the resolution of a map must be from 0.001 m to 10 m, got {info.resolution} m"
+        )
     q = info.origin.orientation
     finite((info.origin.position.x, info.origin.position.y, q.z, q.w), "the map's origin")
     if abs(se2.yaw_from_quaternion(q.x, q.y, q.z, q.w)) > 1e-6:
-        raise InvalidMessage("a map whose origin is rotated is not supported")
+        raise InvalidMessage("a map whose origin is rotated is not supported; rotate its cells")
     cells = data.reshape(rows, columns)
     origin = np.array([info.origin.position.x, info.origin.position.y])
     return OccupancyGrid((cells < 0) | (cells >= 50), round(float(info.resolution), 9), origin)
@@ -267,7 +272,7 @@ def limits_from_ros(message: Any) -> CurvatureLimits:
     low, high = message.curvature_min, message.curvature_max
     finite((low, high), "a curvature limit")
     if not low < 0.0 < high:
-        raise InvalidMessage(f"curvature limits must enclose 0, got [{low}, {high}]")
+        raise InvalidMessage(f"the curvature limits must enclose 0, got [{low}, {high}] 1/m")
     return CurvatureLimits(low, high)
 
 

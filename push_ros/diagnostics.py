@@ -53,7 +53,8 @@ class Diagnostics:
     def _mismatch(self, topic: str, kind: str, info: Any) -> None:
         self.qos_mismatches[topic] = info.total_count
         self._node.get_logger().warning(
-            f"a {kind} of {topic} has an incompatible QoS ({info.last_policy_kind})"
+            f"a {kind} of {topic} has an incompatible QoS ({info.last_policy_kind}), so no "
+            "messages arrive; use the QoS that the README lists"
         )
 
     def watch_publishers(self, topic: str) -> None:
@@ -68,7 +69,7 @@ class Diagnostics:
             if count > 1:
                 found.append(f"{count} publishers on {topic}")
                 if topic not in self.rivals:
-                    self._node.get_logger().warning(f"{found[-1]}; there must be one")
+                    self._node.get_logger().warning(f"{found[-1]}; stop all but one")
                 self.rivals.add(topic)
             else:
                 self.rivals.discard(topic)

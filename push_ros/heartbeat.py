@@ -52,7 +52,9 @@ class HeartbeatWatch:
         stamp = time_from_ros(message.stamp)
         known = self._feed.stamp > 0.0  # before the first frame nothing is early
         if known and stamp > self._feed.stamp + _AHEAD:
-            self._diagnostics.refuse(self._topic, "its stamp lies in the future")
+            self._diagnostics.refuse(
+                self._topic, f"its stamp lies more than {_AHEAD:g} s ahead of the poses"
+            )
             return
         self._stamp = max(self._stamp, stamp)
         self._heard = self._feed.clock.now

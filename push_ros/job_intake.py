@@ -152,7 +152,9 @@ class JobIntake:
         message.plan_ready = self._owner.plan_ready
         if not self._owner.busy and self._keeper.pending is not None:
             message.state, message.state_name = int(JobPhase.PLANNING), JobPhase.PLANNING.name
-            message.reason = "the node was restarted; its job is taken up when all is known"
+            message.reason = (
+                "the node was restarted; it continues its job when map, poses and nodes are there"
+            )
         elif not self._owner.busy and not message.plan_ready:
             self._keeper.end()
         nanoseconds = round(1e9 * seconds)
@@ -193,7 +195,7 @@ class JobIntake:
             self._drop(refusal)
             return
         if job is not None:
-            self._node.get_logger().warning("the node was restarted; its job is taken up again")
+            self._node.get_logger().warning("the node was restarted and continues its job")
             targets = tuple(np.array(t) for t in job.targets)
             self._goal = targets[-1]
             goal = bytes.fromhex(job.goal)
@@ -203,14 +205,19 @@ class JobIntake:
     def reset(self) -> None:
         """The clock has gone back."""
         if self._keeper.pending is not None:
-            self._drop(GoalRefused(JobError.CLOCK_RESET, "the clock jumped back"))
+            self._drop(
+                GoalRefused(JobError.CLOCK_RESET, "the clock jumped back; send the goal again")
+            )
 
     def wait(self, now: float) -> None:
         """Tell the time [s] on the clock for silence, while no frame comes too."""
         if self._keeper.pending is not None:
             self._since = now if math.isnan(self._since) else self._since
             if now - self._since > PATIENCE:
-                why = f"map, poses or other nodes were missing for {PATIENCE:g} s"
+                why = (
+                    f"map, poses or other nodes were missing for {PATIENCE:g} s; "
+                    "send the goal again"
+                )
                 self._drop(GoalRefused(JobError.JOB_FORGOTTEN, f"the node was restarted; {why}"))
 
     def _drop(self, refusal: GoalRefused) -> None:

@@ -1,9 +1,9 @@
-"""Takes a job up again after the node that owns it has died and was started again.
+"""Continues a job after the node that owns it has died and was restarted. No ROS here.
 
-While a job is under way, what is needed to go on with it is kept (``job_memory.py``). The node that
-is started in the place of a dead one goes on only if nothing speaks against it: it is the same run
-of the world, its clock has not gone back, not much time has passed, and object and robots are where
-they were. Robots stand meanwhile, because nobody commands them. No ROS here.
+During a job, everything that is needed to continue it is stored (``job_memory.py``). The restarted
+node continues the job only under these conditions: the run of the world is the same, its clock has
+not jumped back, not much time has passed, and object and robots have hardly moved. While the node
+is away, the robots do not move, because they receive no commands.
 """
 
 import math
@@ -18,10 +18,10 @@ from push_model.jobs import GoalRefused, JobError
 from push_ros.job_memory import JobMemory, KeptJob
 
 _EVERY = 0.2  # [s] of pose time between two times at which a job is kept
-_LONGEST = 60.0  # [s] of pose time after which a job is not taken up again
+_LONGEST = 60.0  # [s] of pose time after which a job is not continued
 PATIENCE = 30.0
-"""[s] that a node waits after its restart until a job can be taken up."""
-_MOST_RESTARTS = 3  # of the node during one job: it may die of the job
+"""[s] that a restarted node waits until its job can be continued."""
+_MOST_RESTARTS = 3  # of the node during one job, which may be the cause
 _ITEM_WAY, _ITEM_TURN = 0.1, 0.5  # [m], [rad] that the object may have moved meanwhile
 _ROBOT_WAY = 0.2  # [m] that a robot may have moved meanwhile: it stops after 0.2 s
 
@@ -31,8 +31,10 @@ Bodies = Callable[[], Mapping[str, Array]]
 
 
 class JobKeeper:
-    """Of one node. pending: a job that was under way when the node before this one died, and has
-    not been taken up yet."""
+    """The job memory of one node.
+
+    pending: the job of the node that died, as long as the restarted node has not continued it.
+    """
 
     def __init__(self, memory: JobMemory, team: tuple[str, ...]) -> None:
         """team: object, then robots."""
@@ -86,23 +88,30 @@ class JobKeeper:
         self._memory.write(replace(job, targets=left))
 
     def judge(self, stamp: float, world: str, bodies: Mapping[str, Array]) -> KeptJob | None:
-        """The pending job, if it can be taken up in a frame; None where more has to be known.
+        """The pending job, if it can be continued now. None if more frames are needed to decide.
+
+        stamp: [s] of the frame. world: run of the world. bodies: poses ``(3,)`` by name.
 
         Raises
         ------
-        GoalRefused: it must not be taken up.
+        GoalRefused: the job must not be continued.
         """
         job = self.pending
         if job is None:
             return None
         if stamp < job.stamp or (world and job.world and world != job.world):
-            raise GoalRefused(JobError.CLOCK_RESET, "the world was reset while the node was away")
+            raise GoalRefused(
+                JobError.CLOCK_RESET,
+                "the world was reset while the node was away; send the goal again",
+            )
         if job.times:
-            raise _forgotten("a trajectory cannot be taken up in the middle")
+            raise _forgotten("a trajectory with times cannot be continued")
         if job.restarts > _MOST_RESTARTS:
             raise _forgotten(f"the node has died {job.restarts} times during this job")
         if stamp - job.stamp > _LONGEST:
-            raise _forgotten(f"the node was away for {stamp - job.stamp:.0f} s")
+            raise _forgotten(
+                f"the node was away for {stamp - job.stamp:.0f} s, longer than {_LONGEST:g} s"
+            )
         if job.world and not world:
             return None
         item = self._team[0]
@@ -118,12 +127,12 @@ class JobKeeper:
                 name == item and turn > _ITEM_TURN
             ):
                 raise _forgotten(
-                    f"somebody moved '{name}' while the node was away: {1e3 * way:.0f} mm, "
-                    f"{turn:.2f} rad"
+                    f"'{name}' was moved by {1e3 * way:.0f} mm and {turn:.2f} rad while the node "
+                    "was away"
                 )
         return job
 
 
 def _forgotten(why: str) -> GoalRefused:
-    text = f"the node was restarted and has not taken its job up again: {why}; send the goal again"
+    text = f"the node was restarted and does not continue its job: {why}; send the goal again"
     return GoalRefused(JobError.JOB_FORGOTTEN, text)

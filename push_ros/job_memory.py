@@ -1,8 +1,8 @@
-"""What a node keeps of its job for the one that is started in its place when it dies.
+"""The state of a job, stored so that the node can continue the job after a restart.
 
-The launcher gives each node that it may start again a memory: an anonymous file in RAM, inherited
-by the process. It outlives the node and ends with the launcher, so that no job of an earlier
-session can be in it. A node that was not started in this way keeps nothing.
+The launcher gives each node that it may restart a memory: an anonymous file in RAM, which the
+process inherits. The file outlives the node and disappears with the launcher. It therefore never
+contains a job of an earlier session. A node that was started in another way stores nothing.
 """
 
 import json
@@ -11,7 +11,7 @@ import zlib
 from dataclasses import asdict, dataclass
 
 VARIABLE = "PLANAR_PUSH_JOB_MEMORY"
-"""Environment variable with the number of the file."""
+"""Environment variable with the file descriptor."""
 _NAME = "planar_push_job"
 
 

@@ -64,5 +64,7 @@ def chosen_method(name: str) -> MethodSpec:
     spec = method_spec(name)
     if spec is None:
         known = ", ".join(method_names())
-        raise SettingsError(f"no method called '{name}'; expected one of: {known}, or MODULE:NAME")
+        raise SettingsError(
+            f"there is no method '{name}'; expected one of: {known}, or MODULE:ATTRIBUTE"
+        )
     return spec

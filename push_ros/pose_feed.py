@@ -112,14 +112,16 @@ class PoseFeed:
                 return
             message = deserialize_message(data, Poses)
         except (struct.error, RuntimeError, RCLError) as error:
-            self._diagnostics.refuse(self.topic, f"unreadable: {error}")
+            self._diagnostics.refuse(self.topic, f"the message cannot be read: {error}")
             return
         self.take(message)
 
     def take(self, message: Poses) -> None:
         """Judge a frame and hand it on."""
         if message.header.frame_id != FRAME:
-            self._diagnostics.refuse(self.topic, f"frame '{message.header.frame_id}'")
+            self._diagnostics.refuse(
+                self.topic, f"its frame is '{message.header.frame_id}', expected '{FRAME}'"
+            )
             return
         try:
             poses, refused = poses_from_ros(message, self.gate.bodies)

@@ -45,11 +45,11 @@ def report_from_ros(message: ReportMessage) -> Report:
     figures = (message.figures, message.units, message.values, message.limits)
     shapes = (message.kinds, message.layers, message.counts, message.radii)
     if len({len(a) for a in figures}) != 1 or len({len(a) for a in shapes}) != 1:
-        raise InvalidMessage("a report's arrays must have the same length")
+        raise InvalidMessage("the arrays of a report must have the same length")
     points = np.column_stack([np.asarray(message.x), np.asarray(message.y)])
     ends = np.cumsum([0, *message.counts])
     if len(message.x) != len(message.y) or ends[-1] != len(points):
-        raise InvalidMessage("a report has another number of points than its shapes need")
+        raise InvalidMessage("the number of points of a report must be the sum of its counts")
     try:
         kinds = [ShapeKind(int(k)) for k in message.kinds]
     except ValueError as error:
@@ -97,7 +97,7 @@ def belief_from_ros(message: BeliefMessage, base: Belief) -> Belief:
     """
     columns = (message.bodies, message.quantities, message.values, message.lows, message.highs)
     if len({len(c) for c in columns}) != 1:
-        raise InvalidMessage("a belief's arrays must have the same length")
+        raise InvalidMessage("the arrays of a belief must have the same length")
     if not message.source:
         raise InvalidMessage("a belief needs a source: set the field 'source'")
     try:
@@ -113,7 +113,7 @@ def belief_from_ros(message: BeliefMessage, base: Belief) -> Belief:
 
 def _outline(message: BelievedOutline) -> Array:
     if len(message.x) != len(message.y):
-        raise InvalidMessage(f"the outline of '{message.body}' needs as many x as y")
+        raise InvalidMessage(f"the outline of '{message.body}' must have as many x as y values")
     return np.column_stack([np.asarray(message.x), np.asarray(message.y)])
 
 

@@ -58,8 +58,8 @@ class Discovery:
             before = now
             if probes >= self._most:
                 raise NotDiscovered(
-                    f"the nodes did not find each other: {probes} endpoints that were made after "
-                    f"theirs have been discovered meanwhile, and nothing else has changed: {now}"
+                    f"the nodes did not find each other: {probes} endpoints that were created "
+                    f"later have been discovered, but nothing else has changed: {now}"
                 )
 
     def settle(self) -> None:

@@ -94,7 +94,9 @@ class FormationSettings:
 
     def __post_init__(self) -> None:
         if len(self.x) != len(self.y):
-            raise SettingsError(f"x and y: {len(self.x)} and {len(self.y)} places")
+            raise SettingsError(
+                f"x and y must have the same number of values, got {len(self.x)} and {len(self.y)}"
+            )
 
 
 class Formation:
@@ -194,7 +196,7 @@ class Formation:
 def check_discs(robots: Mapping[str, RobotSpec], item: ObjectSpec) -> None:
     """Raise SettingsError unless all robots move in any direction."""
     if not all(isinstance(r.drive, HolonomicDrive) for r in robots.values()):
-        raise SettingsError("has robots on wheels; a formation is of robots that go anywhere")
+        raise SettingsError("has robots on wheels; a formation needs holonomic robots")
 
 
 METHOD = MethodSpec("formation", Formation, {"": FormationSettings}, check_discs, "group-ellipse")

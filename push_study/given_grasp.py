@@ -123,7 +123,9 @@ class GraspPlans:
 
     def _plan(self, request: Request, item: ObjectSpec, robot: RobotSpec) -> GroupPlan:
         if request.trajectory is None or request.dead:
-            raise NoStep("a grasp is chosen for a trajectory and for all robots")
+            raise NoStep(
+                "a grasp can be chosen only for a trajectory, and only if no robot is dead"
+            )
         count = len(request.robots)
         self.grasp = choose(self._settings, item, robot, count, request.trajectory)
         planner = StepPlanner(self._grid, item, robot)
@@ -148,7 +150,10 @@ class GivenGrasp(GroupMethod):
     def assess(self, task: Task, belief: Belief, seen: Seen | None) -> Certificate | Refusal:
         """See Method: only trajectories are taken."""
         if not task.times:
-            return Refusal(JobError.INVALID_GOAL, "a grasp is chosen for a trajectory; give one")
+            return Refusal(
+                JobError.INVALID_GOAL,
+                "a grasp can be chosen only for a trajectory; send a trajectory",
+            )
         return super().assess(task, belief, seen)
 
     def step(self, seen: Seen, belief: Belief) -> Told:

@@ -157,7 +157,9 @@ def _check(options: StudyOptions) -> None:
     if not stems or not all(stems):
         raise SettingsError("scenarios: expected names or paths, with commas between them")
     if len(set(stems)) < len(stems):
-        raise SettingsError(f"scenarios: each once, and names that differ; got {', '.join(stems)}")
+        raise SettingsError(
+            f"scenarios: give each once, and files with different names; got {', '.join(stems)}"
+        )
     uncertainty(options.uncertainty)
     if options.world:
         world_kind(options.world)

@@ -138,7 +138,7 @@ class Synchronised(GivenGrasp):
         here = self._prediction.robots(robots)[pushers]
         twists = self._trackers.step(now, tick, here)
         if self._trackers.lost:
-            self.end(JobError.EXECUTION_FAILED, "a robot cannot follow its way")
+            self.end(JobError.EXECUTION_FAILED, "a robot cannot follow its path")
             return Told()
         commands = zip(pushers, twists.tolist(), strict=True)
         return Told({names[i]: (v, omega) for i, (v, omega) in commands})

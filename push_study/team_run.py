@@ -255,7 +255,7 @@ def _run(
         run.start()
         node, watcher = run.supervisor, watchers[0]
         if not isinstance(node, MethodNode):
-            raise SettingsError(f"the system '{system}' hosts no method")
+            raise SettingsError(f"the system '{system}' is not a method; give the name of a method")
         run.spin_until(lambda: len(watcher.trace.now) > 0 and node.seen is not None, 5.0)
         begin = run.bridge.time
         watcher.recording = True

@@ -176,7 +176,9 @@ class SupervisorNode(Node):
             robot, item = bodies[0].get(self.robot), bodies[1].get(self.object)
             now = [None if b is None else b["type"] for b in (robot, item)]
         except (yaml.YAMLError, AttributeError, KeyError, TypeError) as error:
-            self._diagnostics.refuse(self.names.world("scenario"), f"no scenario: {error}")
+            self._diagnostics.refuse(
+                self.names.world("scenario"), f"the message is not a scenario: {error}"
+            )
             return
         before, self._world = self._world, now
         if before is not None and before != now:
@@ -251,7 +253,9 @@ class SupervisorNode(Node):
         request = self._requests.request
         if verdict.step is Step.ASK and request is not None:
             if self._requests.asks > 1:
-                self.get_logger().warning(f"{request.peer.value} does not answer; asking again")
+                self.get_logger().warning(
+                    f"{request.peer.value} does not answer; the request is repeated"
+                )
             self._ask(self._requests.number, request.command)
         elif verdict.step is Step.LOST:
             self._peers.let_go()

@@ -1,12 +1,18 @@
-"""Requests: what was asked of which node, how often, and what to make of silence. No ROS.
+"""Requests of the supervisor to other nodes, with time-outs and retries. No ROS.
 
-The state machine commands; a node is asked as soon as it is there and the poses are known. One that
-dies in the middle of its work never answers. Its servers stay in the graph for seconds, and those
-of one started in its place look the same: only signs of life tell. The controller must give one in
-time by the clock of the poses, which stands still with them, and by the owner's clock, for a
-simulation that runs fast. The planner must give one in time by the owner's clock. In lockstep the
-world does not wait for the planner, which may take any time there: it is lost only when its server
-has left the graph.
+The state machine issues commands. Each command becomes a request to one node. The request is sent
+as soon as the server of that node is in the graph and the poses are known.
+
+A node that dies during its work never answers. Its servers stay in the graph for some seconds, and
+the servers of a restarted node look the same. The supervisor therefore relies on signs of life,
+such as feedback:
+
+- The controller counts as lost if the time without a sign of life is too long by pose time and also
+  by the clock of the supervisor. Pose time stands still without poses. The second clock matters
+  in a simulation that is faster than real time.
+- The planner counts as silent if this time is too long by the clock of the supervisor.
+- In lockstep, planning may take any time. The planner then counts as lost only when its server has
+  left the graph.
 """
 
 from collections.abc import Callable, Mapping
@@ -19,11 +25,11 @@ from push_supervisor.commands import Question
 from push_supervisor.settings import SupervisorSettings
 
 ASKS = 3
-"""Times that the planner is asked the same."""
+"""Maximum number of times that the same request is sent to the planner."""
 
 
 class Peer(Enum):
-    """Who can be asked."""
+    """The nodes to which requests are sent, with their names in messages."""
 
     PLANNER = "the planner"
     PATHS = "the planner of robot paths"
@@ -38,14 +44,17 @@ PEERS: Mapping[type[Question], Peer] = {
     commands.FollowPush: Peer.CONTROLLER,
     commands.FollowRetreat: Peer.CONTROLLER,
 }
-"""Who is asked for what."""
+"""The node to which each kind of command is sent."""
 
 
 @dataclass(frozen=True)
 class Moment:
-    """clock [s]: see ``push_ros.pace_feed.LivenessClock``; stamp [s]: of the poses; poses: whether
-    those of robot and object are known; ready: whether a peer's server is there; lockstep: whether
-    the world waits for its controllers."""
+    """The present state of the surroundings, as far as requests depend on it.
+
+    clock: [s] time of the supervisor, see ``push_ros.pace_feed.LivenessClock``. stamp: [s] of the
+    newest poses. poses: whether the poses of robot and object are known. ready: whether the server
+    of a peer is in the graph. lockstep: whether the world waits for its controllers.
+    """
 
     clock: float
     stamp: float
@@ -56,29 +65,29 @@ class Moment:
 
 @dataclass(frozen=True)
 class Request:
-    """What to ask. delay: [s] of pose time to wait before."""
+    """A request. command: what is requested. delay: [s] of pose time before it is sent."""
 
     command: Question
     delay: float = 0.0
 
     @property
     def peer(self) -> Peer:
-        """Who is asked."""
+        """The node to which the request is sent."""
         return PEERS[type(self.command)]
 
 
 class Step(Enum):
-    """What the owner is to do now."""
+    """What the supervisor has to do now."""
 
     WAIT = "nothing"
-    ASK = "ask, with the number of this asking"
+    ASK = "send the request, with its number"
     LOST = "the controller is gone"
     GIVE_UP = "nobody will answer"
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """code, message: with GIVE_UP and LOST."""
+    """What to do now. code, message: the reason of the steps GIVE_UP and LOST."""
 
     step: Step
     code: JobError = JobError.NONE
@@ -89,9 +98,12 @@ _WAIT, _ASK = Verdict(Step.WAIT), Verdict(Step.ASK)
 
 
 class Requests:
-    """One request at a time; each asking has a number, by which answers are told from late ones.
+    """Handles one request at a time.
 
-    request: the one under way, None when there is none. asks: how often it was asked.
+    Each attempt has a number. An answer with an older number is late and is ignored.
+
+    request: the present request, or None. number: of the last attempt. asks: number of attempts of
+    the present request.
     """
 
     def __init__(self, settings: SupervisorSettings) -> None:
@@ -105,20 +117,20 @@ class Requests:
         self._sign_clock = self._sign_stamp = 0.0
 
     def begin(self, request: Request, now: Moment) -> None:
-        """Take a request in the place of whatever is under way."""
+        """Begin a request. It replaces the present one."""
         self.drop()
         self.request = request
         self._not_before = now.stamp + request.delay
 
     def drop(self) -> None:
-        """Whatever is under way is not wanted any more; answers to it are late."""
+        """Abandon the present request. Answers to it are ignored."""
         self.request = None
         self.number += 1
         self.asks = 0
         self._asked, self._missing = False, None
 
     def tend(self, now: Moment) -> Verdict:
-        """To be called often; says what to do. After ASK the request counts as asked."""
+        """Say what to do now; call this often. After ASK the request counts as sent."""
         if self.request is None:
             return _WAIT
         if self._asked:
@@ -136,17 +148,23 @@ class Requests:
         self.drop()
         if now.poses:
             return Verdict(
-                Step.GIVE_UP, JobError.NODE_LOST, f"{peer.value} is not in the ROS graph"
+                Step.GIVE_UP,
+                JobError.NODE_LOST,
+                f"{peer.value} is not in the ROS graph; start it, or launch with --respawn",
             )
-        return Verdict(Step.GIVE_UP, JobError.POSES_STALE, "no poses of robot and object")
+        return Verdict(
+            Step.GIVE_UP,
+            JobError.POSES_STALE,
+            "no poses of robot and object arrive; check the motion capture",
+        )
 
     def sign(self, number: int, now: Moment) -> None:
-        """A sign of life of whoever was asked with this number."""
+        """Take note of a sign of life of the node that received the attempt with this number."""
         if number == self.number and self._asked:
             self._sign_clock, self._sign_stamp = now.clock, now.stamp
 
     def answer(self, number: int) -> bool:
-        """Whether an answer is the one waited for, and not a late one; the request is done then."""
+        """Whether an answer belongs to the present attempt. If so, the request is complete."""
         if number != self.number or not self._asked:
             return False
         self.drop()
@@ -169,7 +187,9 @@ class Requests:
             if silence <= self.settings.controller_timeout:
                 return _WAIT
             self.drop()
-            return Verdict(Step.LOST, JobError.NODE_LOST, f"{request.peer.value} is gone")
+            return Verdict(
+                Step.LOST, JobError.NODE_LOST, f"{request.peer.value} no longer responds"
+            )
         if silence <= self.settings.answer_timeout:
             return _WAIT
         if self.asks >= ASKS:

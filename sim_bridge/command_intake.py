@@ -231,10 +231,12 @@ class CommandIntake:
         ]
         frame = message.header.frame_id
         if {len(c) for c in columns} != {n}:
-            self._diagnostics.refuse(self._many, "arrays must be as long as names, or empty")
+            self._diagnostics.refuse(self._many, "each array must be empty or as long as 'names'")
             return
         if frame != FRAME and frame not in _OWN_FRAMES:
-            self._diagnostics.refuse(self._many, f"frame '{frame}', not base_link or {FRAME}")
+            self._diagnostics.refuse(
+                self._many, f"its frame is '{frame}', expected 'base_link' or '{FRAME}'"
+            )
             return
         fixed = frame == FRAME
         twists = np.column_stack(columns)

@@ -71,7 +71,7 @@ def displace(world: World, name: str, pose: Array, footing: Footing) -> str:
     if name not in world.names:
         raise SettingsError(f"no body '{name}'; there are: {', '.join(world.names)}")
     if not np.isfinite(pose).all():
-        raise SettingsError(f"{name} cannot be put at {pose.tolist()}")
+        raise SettingsError(f"{name} cannot be put at {pose.tolist()}: the pose is not finite")
     pose = np.array([pose[0], pose[1], se2.wrap(float(pose[2]))])
     trouble = footing.trouble(name, pose, world.poses())
     if trouble is not None:

@@ -230,7 +230,7 @@ class BridgeNode(Node):
         assert self.world is not None
         world, outputs = self.world, self.outputs
         for robot in self._named(self._intake.watch(self.time)):
-            self.get_logger().warning(f"{robot}: no fresh command, wheels stopped")
+            self.get_logger().warning(f"{robot} receives no fresh commands; its wheels are stopped")
         done = self._disturbances.apply(self.tick, world, self._capture)
         if done:
             self.get_logger().info("; ".join(done))

@@ -37,7 +37,7 @@ def _wheeled(client: int, spec: RobotSpec, start: Array, surface: float) -> Robo
         return SpeedBody(client, spec, spec.drive, start, surface)
     if isinstance(spec.drive, TorqueDrive):
         return TorqueBody(client, spec, spec.drive, start, surface)
-    raise SettingsError(f"no body in PyBullet for a drive '{spec.drive.kind}'")
+    raise SettingsError(f"PyBullet has no body for the drive '{spec.drive.kind}'")
 
 
 class PyBulletWorld:

@@ -100,7 +100,7 @@ class Hand:
             by = np.array([far * np.cos(angle), far * np.sin(angle), turn])
             if self._footing.along(self.item, by, poses)[1] is None:
                 return float(by[0]), float(by[1]), float(by[2])
-        raise RuntimeError(f"nowhere is room to move {self.item} to")
+        raise RuntimeError(f"there is no free pose to which '{self.item}' can be moved")
 
 
 def trial(task: DisplacedTask) -> Row:

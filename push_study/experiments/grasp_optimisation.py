@@ -202,8 +202,9 @@ def conclude(options: StudyOptions, tasks: Sequence[OptimisationTask], rows: lis
             print(
                 f"{model}: {sum(r['success'] for r in mine)} of {len(mine)} within "
                 f"{100 * WORSE:g} % of an exhaustive grid's best, worst {100 * worst:+.2f} %; the "
-                f"local method ends dearer in {100 * missed:.0f} % from the thesis's start and in "
-                f"{100 * share:.0f} % from {mine[0]['local_starts']} random ones"
+                f"local method ends at a higher cost in {100 * missed:.0f} % from the "
+                f"thesis's start and in {100 * share:.0f} % from {mine[0]['local_starts']} random "
+                "starts"
             )
     for name in options.scenarios:
         found = [

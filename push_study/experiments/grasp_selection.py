@@ -187,13 +187,13 @@ def conclude(options: StudyOptions, tasks: Sequence[SelectionTask], rows: list[R
         pairs = _pairs([r for r in rows if r.get("law") == law], "grasp")
         lower = sum(p["selected"] < p["random"] for p in pairs)
         print(
-            f"{law}: the selected grasp is nearer in {lower} of {len(pairs)} pairs, "
+            f"{law}: the selected grasp has a smaller error in {lower} of {len(pairs)} pairs, "
             f"p = {sign_test(lower, len(pairs)):.3f}"
         )
     pairs = _pairs(rows, "law")
     lower = sum(p["group"] < p["mpc"] for p in pairs)
     print(
-        f"the group law is nearer than the LTV-MPC in {lower} of {len(pairs)} pairs, "
+        f"the group law has a smaller error than the LTV-MPC in {lower} of {len(pairs)} pairs, "
         f"p = {sign_test(lower, len(pairs)):.3f}"
     )
     for r in rows:

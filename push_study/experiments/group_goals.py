@@ -138,7 +138,7 @@ def problem(task: GoalTask) -> Problem:
         here = se2.transform(start, outline)
         robots = scattered(random, task.robots, space, here, radius, gap=0.03)
         return Problem(environment, item, start, goal, robots)
-    raise RuntimeError("no problem could be drawn")
+    raise RuntimeError("no solvable problem was found among the random ones")
 
 
 def _environment(random: np.random.Generator, obstacles: bool) -> EnvironmentSpec:

@@ -225,8 +225,8 @@ def conclude(options: StudyOptions, tasks: Sequence[TrackingTask], rows: list[Ro
             lower, pairs = _nearer(rows, name, count)
             if pairs:
                 print(
-                    f"{'':13s}the optimised one is nearer in {lower} of {pairs} trials, "
-                    f"p = {sign_test(lower, pairs):.3f}"
+                    f"{'':13s}the optimised placement has a smaller error in {lower} of {pairs} "
+                    f"trials, p = {sign_test(lower, pairs):.3f}"
                 )
     _plots(tasks, options)
 

@@ -214,7 +214,7 @@ def _follow(run: LockstepRun, scenario: Scenario, way: Trajectory) -> Any:
     sent = client.send_goal_async(goal)
     run.spin_until(sent.done, 5.0)
     if not sent.done() or not sent.result().accepted:
-        raise RuntimeError("the controller does not take the trajectory")
+        raise RuntimeError("the controller has rejected the trajectory")
     answer = sent.result().get_result_async()
     ended = run.spin_until(answer.done, _LIMIT, math.inf)  # no wall clock: the machine may be busy
     return answer.result().result if ended else None

@@ -165,7 +165,7 @@ def _angle(first: tuple[float, float], second: tuple[float, float]) -> float:
 
 
 def statistics(rows: list[Row]) -> dict[str, Any]:
-    """Medians of the ratios over the trials that came through all four runs."""
+    """Medians of the ratios over the trials that completed all four runs."""
     good = [r for r in rows if r["success"]]
     names = ("dead_over_alive", "moved_over_direct", "with_the_arc")
     return {f"{n}_median": float(np.median([r[n] for r in good])) for n in names if good}
@@ -174,21 +174,21 @@ def statistics(rows: list[Row]) -> dict[str, Any]:
 def conclude(options: StudyOptions, tasks: Sequence[UpsetTask], rows: list[Row]) -> None:
     """The ratios, and the price of a moved target by how far its way bends."""
     good = [r for r in rows if r["success"]]
-    print(f"\n{len(good)} of {len(rows)} trials came through all four runs")
+    print(f"\n{len(good)} of {len(rows)} trials completed all four runs")
     if not good:
         return
     for key, told in (
         (
             "dead_over_alive",
-            f"time with {DEAD} of {ROBOTS} dead from half of it on, over alive",
+            f"time if {DEAD} of {ROBOTS} robots fail half-way, relative to no failure",
         ),
-        ("moved_over_direct", "time a metre with the target moved, over going there at once"),
-        ("with_the_arc", "the same, with the arc that robots have to go round the object"),
+        ("moved_over_direct", "time per metre if the target is moved, relative to a direct run"),
+        ("with_the_arc", "the same, with the arc of the robots around the object as path"),
     ):
         values = np.array([r[key] for r in good])
         print(f"{told}: median {np.median(values):.3f}, {values.min():.3f} to {values.max():.3f}")
     direct, moved = (np.mean([r[k] for r in good]) for k in ("direct_s_per_m", "moved_s_per_m"))
-    print(f"time a metre on average: {direct:.2f} s at once, {moved:.2f} s moved")
+    print(f"mean time per metre: {direct:.2f} s direct, {moved:.2f} s with a moved target")
     figure, ax = plt.subplots(figsize=(5, 3))
     ax.plot([r["bend_rad"] for r in good], [r["moved_over_direct"] for r in good], "o")
     ax.axhline(1.0, color="C7", lw=0.7)
