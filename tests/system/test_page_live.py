@@ -53,6 +53,7 @@ class Page:
             self.value(f"document.getElementById('{name}').value = {value!r}")
 
     def start(self, system, scenario):
+        self.until("!document.getElementById('world').hidden")
         self.fill(system=system, scenario=scenario)
         self.click("start")
         self.until("document.getElementById('trouble').hidden", 60.0)
@@ -148,8 +149,9 @@ def test_single_by_everything_that_the_page_offers(page):
     # the object moved by hand, a typed goal, cancelled
     page.choose("move")
     box = page.shown_pose("box")
-    page.drag(page.pixel(*box[:2]), page.pixel(box[0] - 0.1, box[1] + 0.05))
-    assert until(lambda: far(page.shown_pose("box"), (box[0] - 0.1, box[1] + 0.05)) < 0.02, 5.0)
+    page.drag(page.pixel(*box[:2]), page.pixel(box[0], box[1] + 0.2))
+    there = (box[0], box[1] + 0.2)
+    assert until(lambda: far(page.shown_pose("box"), there) < 0.02, 5.0), page.text("answer")
     page.choose("goal")
     page.click("preview")
     page.fill(x="0.1", y="0.0", theta="0.0")
