@@ -71,6 +71,15 @@ class BagWriter:
             self._file.flush()
             self._write_metadata()
 
+    @property
+    def last(self) -> int:
+        """[ns] greatest log time so far."""
+        return self._last
+
+    def count(self, topic: str) -> int:
+        """Messages of a topic so far."""
+        return self._topics[topic].count
+
     def close(self) -> None:
         """Finish the file; safe to call twice."""
         if self.closed:
