@@ -46,12 +46,15 @@ class State:
 class ReportSeries:
     """What one method or controller reported.
 
-    times [s] and phases of its reports. figures: by name, unit, times [s] and values. moments: time
-    [s] and whole report, every few seconds.
+    times [s], phases and CPU times [s] of its reports. figures: by name, unit, times [s] and
+    values. limits: by name of a figure, the last one told. moments: time [s] and whole report,
+    every few seconds.
     """
 
     method: str
     times: list[float] = field(default_factory=list)
+    solve_times: list[float] = field(default_factory=list)
+    limits: dict[str, float] = field(default_factory=dict)
     phases: list[str] = field(default_factory=list)
     figures: dict[str, tuple[str, list[float], list[float]]] = field(default_factory=dict)
     moments: list[tuple[float, Report]] = field(default_factory=list)
@@ -60,7 +63,9 @@ class ReportSeries:
         """Add a report of a time [s]."""
         self.times.append(time)
         self.phases.append(report.phase)
+        self.solve_times.append(report.solve_time)
         for figure in report.figures:
+            self.limits[figure.name] = figure.limit
             _, times, values = self.figures.setdefault(figure.name, (figure.unit, [], []))
             times.append(time)
             values.append(figure.value)
@@ -70,8 +75,10 @@ class ReportSeries:
 
 @dataclass
 class Job:
-    """What a team did. goal ``(3,)``: the last one; plan: ``(n, 2)`` [m] path of the axle in each
-    push, or of the object that a group pushes; reports: by topic, of method and controllers."""
+    """What a team did. goal ``(3,)``: the last one; goals: each with the time [s] from which it
+    held; plan: ``(n, 2)`` [m] path of the axle in each push, or of the object that a group pushes;
+    plan_times: [s] wall time of each plan that tells it; reports: by topic, of method and
+    controllers."""
 
     space: str
     system: str = ""
@@ -79,8 +86,16 @@ class Job:
     object: str = ""
     states: list[State] = field(default_factory=list)
     goal: Array | None = None
+    goals: list[tuple[float, Array]] = field(default_factory=list)
     plan: list[Array] = field(default_factory=list)
+    plan_times: list[float] = field(default_factory=list)
     reports: dict[str, ReportSeries] = field(default_factory=dict)
+
+    @property
+    def unfinished(self) -> str:
+        """The state in which the recording ends in mid-job; empty if no job was under way."""
+        last = self.states[-1].name if self.states else "IDLE"
+        return "" if last == "IDLE" else last
 
 
 @dataclass
@@ -210,6 +225,7 @@ def load(bag: Path) -> BagContents:
             elif record.topic.endswith("/group_plan"):
                 job.plan.append(np.column_stack([m.x, m.y]))
             else:
+                job.plan_times.append(float(m.statistics.plan_time))
                 job.plan = [np.column_stack([s.trajectory.x, s.trajectory.y]) for s in m.segments]
     for topic, told in series.items():
         _give(contents.jobs, topic, told)
@@ -239,6 +255,9 @@ def _take_state(job: Job, message: Any) -> None:
     )
     if message.goal.header.frame_id:
         try:
-            job.goal = planar_pose(message.goal.pose, "the goal")
+            goal = planar_pose(message.goal.pose, "the goal")
+            if job.goal is None or not np.array_equal(goal, job.goal):
+                job.goals.append((stamp, goal))
+            job.goal = goal
         except InvalidMessage:  # a recorded message need not be valid
             pass

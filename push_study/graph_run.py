@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,7 @@ from push_ros.claims import claim_domain
 from push_ros.names import Names, space
 from push_ros.process import Spinner, prepare_environment
 from push_scenario.scenario import Scenario
-from push_study.discovery import Discovery
+from push_study.discovery import Discovery, NotDiscovered
 from push_study.observer import Observer
 
 _ROLES = ("controller", "planner", "supervisor")
@@ -156,8 +156,12 @@ class LockstepRun:
         self.close()
 
     def close(self) -> None:
-        """Destroy everything that this run made."""
+        """Destroy everything that this run made. The bag gets all that was published before."""
         if self.spinner is not None:
+            if self.recorder is not None and self.bridge.running:
+                self.bridge.running = False
+                with suppress(NotDiscovered):
+                    Discovery(self.observer, self.spinner).probe()
             self.spinner.close()
         self._stack.close()
 
