@@ -7,6 +7,7 @@ import signal
 import sys
 from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from planar_push.arguments import (
     add_factor,
@@ -16,8 +17,14 @@ from planar_push.arguments import (
     scenario_of,
     stop_on_signals,
     tell,
+    whole,
 )
 from push_bringup.failures import SuiteFailed
+from push_model.settings import SettingsError
+
+if TYPE_CHECKING:
+    from push_bringup.job_result import JobResult
+    from push_scenario.scenario import Scenario
 
 _POSITION, _ORIENTATION = 0.02, 0.1  # [m], [rad] of a demonstration that succeeds
 
@@ -26,6 +33,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this verb."""
     add_system_and_scenario(parser)
     parser.add_argument("--out", default="results/demo", help="folder; replaces an earlier demo")
+    parser.add_argument(
+        "--lockstep",
+        action="store_true",
+        help="in one process, as fast as possible; `planar-push rerun` repeats it to the bit",
+    )
+    parser.add_argument(
+        "--seed", type=whole(0), default=None, help="of the simulation; default: the scenario's"
+    )
     add_factor(parser)
     add_timeout(parser, 220.0)
     add_namespace(parser)
@@ -36,10 +51,12 @@ def run(arguments: argparse.Namespace) -> int:
     from push_bringup.preparation import check_domain, prepare
     from push_bringup.suite import Suite, scenario_goals
     from push_scenario.scenario import load_scenario
-    from push_view.report import PRODUCTS, write_report
+    from push_view.report import PRODUCTS
 
     out = Path(arguments.out)
     scenario = load_scenario(scenario_of(arguments))
+    if arguments.seed is not None:
+        scenario = scenario.settings("bridge", seed=arguments.seed)
     goals = scenario_goals(scenario)
     words = {
         "system": arguments.system,
@@ -47,6 +64,11 @@ def run(arguments: argparse.Namespace) -> int:
         "factor": arguments.factor,
     }
     prepare(scenario, record=out / "bag.new", **words)
+    if arguments.lockstep:
+        if arguments.factor is not None:
+            raise SettingsError("--factor: a run in lockstep has no pace; leave it out")
+        _clear(out, (*PRODUCTS, "bag"))
+        return _conclude(_in_lockstep(arguments, scenario, out / "bag"), out)
     check_domain(arguments.namespace)
     _clear(out, (*PRODUCTS, "bag"))  # nothing is wrong: an earlier demo may go
     suite = Suite(scenario, record=out / "bag", verbose=True, on_event=tell, **words)
@@ -62,6 +84,23 @@ def run(arguments: argparse.Namespace) -> int:
             print(f"error: {error}", file=sys.stderr)
     if suite.stop_requested:
         return 130
+    return _conclude(results, out)
+
+
+def _in_lockstep(
+    arguments: argparse.Namespace, scenario: "Scenario", bag: Path
+) -> "dict[str, JobResult]":
+    from push_study.recorded_run import recorded_run
+
+    print("running in lockstep", flush=True)
+    words = {"sim_limit": arguments.timeout, "namespace": arguments.namespace}
+    return recorded_run(scenario, arguments.system, bag, **words)
+
+
+def _conclude(results: "dict[str, JobResult]", out: Path) -> int:
+    """Write the report; 0 if every object has reached its goal."""
+    from push_view.report import PRODUCTS, write_report
+
     for result in results.values():
         if not result.success:
             print(f"error: {result}", file=sys.stderr)

@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Record until a signal."""
     from push_bringup.preparation import check_bag
-    from push_record.recorder import RecorderNode, heard_scenario
+    from push_record.recorder import LIVE, RecorderNode, heard_scenario
     from push_ros.process import run_node
     from push_scenario.scenario import load_scenario
 
@@ -29,6 +29,8 @@ def run(arguments: argparse.Namespace) -> int:
         scenario = heard_scenario(arguments.namespace)
 
     def make() -> RecorderNode:
-        return RecorderNode(Path(arguments.out), scenario, namespace=arguments.namespace)
+        return RecorderNode(
+            Path(arguments.out), scenario, namespace=arguments.namespace, about=LIVE
+        )
 
     return int(run_node(make, []))

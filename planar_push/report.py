@@ -1,4 +1,4 @@
-"""Write a report with pictures from a bag."""
+"""Write a report with pictures from a bag, or from the folder of a study."""
 
 import argparse
 import sys
@@ -7,23 +7,35 @@ from pathlib import Path
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this verb."""
-    parser.add_argument("bag")
-    parser.add_argument("--out", default="", help="folder; <bag>-report when it is not given")
+    parser.add_argument("bag", help="a bag, or the folder of a study")
+    parser.add_argument(
+        "--out",
+        default="",
+        help="folder; <bag>-report when it is not given, or the folder of the study",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Write them."""
     from push_view.report import write_report
+    from push_view.study_report import is_study, write_study_report
 
     bag = Path(arguments.bag)
+    if is_study(bag):
+        out = Path(arguments.out) if arguments.out else bag
+        out.mkdir(parents=True, exist_ok=True)
+        count = write_study_report(bag, out / "report.html")
+        print(f"{out / 'report.html'}: {count} trials")
+        return 0
     out = Path(arguments.out) if arguments.out else bag.parent / f"{bag.name}-report"
     try:
         errors = write_report(bag, out)
     except ValueError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
+    word = "final error" if errors["finished"] else "the recording ends in mid-job; error then"
     print(
-        f"{out}: final error {1e3 * errors['position_error_m']:.1f} mm, "
+        f"{out}: {word} {1e3 * errors['position_error_m']:.1f} mm, "
         f"{errors['orientation_error_rad']:.3f} rad"
     )
     return 0

@@ -73,7 +73,7 @@ def prepare(
     if bag is not None:
         check_bag(bag)
         # it is there before the others
-        nodes = (recorder(str(bag), namespace), *nodes)
+        nodes = (recorder(str(bag), namespace, system), *nodes)
     return SuiteSetup(replace(made, name=made.name or "scenario"), nodes, namespace, bag)
 
 

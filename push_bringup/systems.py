@@ -264,7 +264,11 @@ def check_namespace(namespace: str) -> None:
             )
 
 
-def recorder(out: str, namespace: str = "") -> NodeSpec:
-    """The recorder node for a world and all its teams. out: folder of the bag."""
+def recorder(out: str, namespace: str = "", system: str = "") -> NodeSpec:
+    """A recorder of the world in a namespace and of all its teams.
+
+    out: bag folder. system: which one runs; it is noted in the bag.
+    """
     world = _absolute(namespace)
-    return NodeSpec("recorder", "recorder", world, world, parameters={"out": out})
+    parameters = {"out": out} | ({"system": system} if system else {})
+    return NodeSpec("recorder", "recorder", world, world, parameters=parameters)

@@ -18,6 +18,7 @@ from push_record.interfaces import typestore
 
 _CHUNK = 64 * 1024  # [bytes]
 _FLUSH_EVERY = 1.0  # [s] wall time
+_MAGIC = b"\x89MCAP0\r\n"  # at both ends of a finished file
 _MAXIMUM = {"sec": 9223372036, "nsec": 854775807}
 
 
@@ -70,6 +71,15 @@ class BagWriter:
             self._writer.flush()
             self._file.flush()
             self._write_metadata()
+
+    @property
+    def last(self) -> int:
+        """[ns] greatest log time so far."""
+        return self._last
+
+    def count(self, topic: str) -> int:
+        """Messages of a topic so far."""
+        return self._topics[topic].count
 
     def close(self) -> None:
         """Finish the file; safe to call twice."""
@@ -165,6 +175,16 @@ def read_metadata(bag: Path) -> dict[str, str]:
         if isinstance(record, Metadata) and record.name == "planar_push":
             return dict(record.metadata)
     return {}
+
+
+def is_complete(bag: Path) -> bool:
+    """Whether the file was finished; not if its writer was killed."""
+    with bag_file(bag).open("rb") as file:
+        file.seek(0, 2)
+        if file.tell() < 2 * len(_MAGIC):
+            return False
+        file.seek(-len(_MAGIC), 2)
+        return file.read() == _MAGIC
 
 
 def _records(bag: Path) -> Iterator[Any]:

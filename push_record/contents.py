@@ -52,13 +52,16 @@ class State:
 class ReportSeries:
     """What one method or controller reported.
 
-    times [s] and phases of its reports. figures: by name, unit, times [s] and values. moments: time
-    [s] and whole report, ``spacing`` [s] apart or more.
+    times [s], phases and CPU times [s] of its reports. figures: by name, unit, times [s] and
+    values. limits: by name of a figure, the last one told. moments: time [s] and whole report,
+    ``spacing`` [s] apart or more.
     """
 
     method: str
     spacing: float = _MOMENTS
     times: list[float] = field(default_factory=list)
+    solve_times: list[float] = field(default_factory=list)
+    limits: dict[str, float] = field(default_factory=dict)
     phases: list[str] = field(default_factory=list)
     figures: dict[str, tuple[str, list[float], list[float]]] = field(default_factory=dict)
     moments: list[tuple[float, Report]] = field(default_factory=list)
@@ -67,7 +70,9 @@ class ReportSeries:
         """Add a report of a time [s]."""
         self.times.append(time)
         self.phases.append(report.phase)
+        self.solve_times.append(report.solve_time)
         for figure in report.figures:
+            self.limits[figure.name] = figure.limit
             _, times, values = self.figures.setdefault(figure.name, (figure.unit, [], []))
             times.append(time)
             values.append(figure.value)
@@ -77,8 +82,10 @@ class ReportSeries:
 
 @dataclass
 class Job:
-    """What a team did. goal ``(3,)``: the last one; plans: in the order of time; planned_in: number
-    of the job that the last plan is of; reports: by topic, of method and controllers."""
+    """What a team did. goal ``(3,)``: the last one; goals: each with the time [s] from which it
+    held; plans: in the order of time; planned_in: number of the job that the last plan is of;
+    plan_times: [s] wall time of each plan that tells it; reports: by topic, of method and
+    controllers."""
 
     space: str
     system: str = ""
@@ -86,9 +93,17 @@ class Job:
     object: str = ""
     states: list[State] = field(default_factory=list)
     goal: Array | None = None
+    goals: list[tuple[float, Array]] = field(default_factory=list)
     plans: list[Plan] = field(default_factory=list)
     planned_in: int = -1
+    plan_times: list[float] = field(default_factory=list)
     reports: dict[str, ReportSeries] = field(default_factory=dict)
+
+    @property
+    def unfinished(self) -> str:
+        """The state in which the recording ends in mid-job; empty if no job was under way."""
+        last = self.states[-1].name if self.states else "IDLE"
+        return "" if last == "IDLE" else last
 
     @property
     def pushes(self) -> tuple[PlannedPush, ...]:
@@ -233,6 +248,7 @@ def load(bag: Path, moments: float = _MOMENTS) -> BagContents:
             elif record.topic.endswith("/group_plan"):
                 job.plans.append(from_group_plan(m, frames.now, _pieces(job)))
             else:
+                job.plan_times.append(float(m.statistics.plan_time))
                 job.plans.append(from_push_plan(m, frames.now))
     for topic, told in series.items():
         _give(contents.jobs, topic, told)
@@ -265,14 +281,18 @@ def _pieces(job: Job) -> int:
 def _take_state(job: Job, message: Any) -> None:
     job.system, job.object = str(message.system), str(message.object)
     job.robots = tuple(str(r) for r in message.robots)
+    stamp = _seconds(message.header.stamp)
     if message.goal.header.frame_id:
         try:
-            job.goal = planar_pose(message.goal.pose, "the goal")
+            goal = planar_pose(message.goal.pose, "the goal")
+            if job.goal is None or not np.array_equal(goal, job.goal):
+                job.goals.append((stamp, goal))
+            job.goal = goal
         except InvalidMessage:  # a recorded message need not be valid
             pass
     job.states.append(
         State(
-            _seconds(message.header.stamp),
+            stamp,
             str(message.state_name),
             str(message.reason),
             int(message.error_code),

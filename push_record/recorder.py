@@ -1,7 +1,10 @@
 """The recorder node: records the topics of a world and its teams into a bag."""
 
+import json
 import sys
 import time
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 from rclpy.node import Node
@@ -10,7 +13,7 @@ from std_msgs.msg import String
 
 from push_model.settings import SettingsError
 from push_record.bag import BagWriter
-from push_record.revision import revision
+from push_record.revision import revision, versions
 from push_record.topics import recorded_topics
 from push_ros.conversions import time_from_ros
 from push_ros.latched import hear_latched
@@ -18,6 +21,9 @@ from push_ros.names import names_of
 from push_ros.process import run_node
 from push_ros.qos import CLOCK
 from push_scenario.scenario import Scenario, load_scenario, scenario_from_text
+
+LIVE = {"pace": "live"}
+"""Metadata of a bag that a recorder in a process of its own writes."""
 
 _PATIENCE = 5.0  # [s] wall time to receive the scenario
 
@@ -54,6 +60,7 @@ class RecorderNode(Node):
         scenario: Scenario | None = None,
         seed: int | None = None,
         namespace: str = "",
+        about: Mapping[str, str] | None = None,
     ) -> None:
         """Open the bag and subscribe.
 
@@ -63,6 +70,7 @@ class RecorderNode(Node):
         scenario: the running one; default: parameter ``scenario`` (a name or path), or the one
             that is published on ``scenario`` if that is empty.
         seed: of the run; default: the scenario's. namespace: the world's.
+        about: further metadata of the bag, see ``push_record/run_of_bag.py``.
 
         Raises
         ------
@@ -72,6 +80,7 @@ class RecorderNode(Node):
         names = names_of(self)
         folder = Path(str(self.declare_parameter("out", str(folder or "bag")).value))
         name = str(self.declare_parameter("scenario", "").value)
+        system = str(self.declare_parameter("system", "").value)
         world = names.world_space
         if scenario is None:
             scenario = load_scenario(name) if name else heard_scenario(world)
@@ -85,7 +94,10 @@ class RecorderNode(Node):
                 "scenario_name": scenario.name,
                 "seed": str(seed),
                 "revision": revision(),
+                "versions": json.dumps(versions()),
                 "namespace": world,
+                **({"system": system} if system else {}),
+                **(about or {}),
             },
         )
         self._sim_time = 0
@@ -121,7 +133,7 @@ class RecorderNode(Node):
 
 def main() -> int:
     """Entry point of the process: ``--ros-args`` on its command line."""
-    return int(run_node(RecorderNode))
+    return int(run_node(partial(RecorderNode, about=LIVE)))
 
 
 if __name__ == "__main__":

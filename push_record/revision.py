@@ -1,7 +1,24 @@
-"""The state of the source with which a bag or a study was made."""
+"""The state of the source, and of what it runs on, with which a bag or a study was made."""
 
+import platform
 import subprocess
+from importlib import metadata
 from pathlib import Path
+
+_PACKAGES = (
+    "planar-push",
+    "push-msgs",
+    "ros-jazzy-rclpy",
+    "numpy",
+    "scipy",
+    "numba",
+    "pybullet",
+    "ompl",
+    "casadi",
+    "osqp",
+    "daqp",
+)
+"""What the numbers of a run depend on."""
 
 
 def revision() -> str:
@@ -18,3 +35,14 @@ def revision() -> str:
     except (OSError, subprocess.SubprocessError):
         return ""
     return text.strip()
+
+
+def versions() -> dict[str, str]:
+    """Version of Python, the machine, and of each installed package that a run depends on."""
+    found = {"python": platform.python_version(), "machine": platform.machine()}
+    for name in _PACKAGES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    return found

@@ -2,8 +2,9 @@
 
 import os
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,11 +22,12 @@ from push_bringup.systems import LOCKSTEP, nodes_of, teams_of
 from push_model.arrays import Array
 from push_model.jobs import JobError
 from push_msgs.msg import JobState
+from push_record.recorder import RecorderNode
 from push_ros.claims import claim_domain
 from push_ros.names import Names, space
 from push_ros.process import Spinner, prepare_environment
 from push_scenario.scenario import Scenario
-from push_study.discovery import Discovery
+from push_study.discovery import Discovery, NotDiscovered
 from push_study.observer import Observer
 
 _ROLES = ("controller", "planner", "supervisor")
@@ -43,8 +45,8 @@ class TeamRun:
     _jobs: int = 0
     _refusals: int = 0
 
-    def send_goal(self, goal: Array) -> None:
-        """Publish a goal ``(3,)``; ``ended`` is of its job."""
+    def send_goal(self, goal: Array | bytes) -> None:
+        """Publish a goal ``(3,)``, or a serialised message; ``ended`` is of its job."""
         before = self.observer.state
         assert before is not None, "the run has not been started"
         self._jobs, self._refusals = int(before.job), int(before.refusals)
@@ -79,6 +81,8 @@ class LockstepRun:
         quiet: bool = False,
         system: str = "single",
         namespace: str = "",
+        record: Path | None = None,
+        about: Mapping[str, str] | None = None,
     ) -> None:
         """Make the nodes.
 
@@ -89,12 +93,15 @@ class LockstepRun:
         world: what the bridge simulates, when it differs from what is believed.
         quiet: log warnings only.
         system: which nodes, see ``push_bringup.systems``. namespace: of the world.
+        record: folder of a bag from which ``planar-push rerun`` can repeat the run.
+        about: further metadata of that bag.
         """
         prepare_environment()
         if quiet:
             set_logger_level("", LoggingSeverity.WARN)
         if "ROS_DOMAIN_ID" not in os.environ:
             claim_domain()
+        self._names = Names(space(namespace), space(namespace))
         self._stack = ExitStack()
         self.spinner: Spinner | None = None
         self.scenario, simulated = (
@@ -121,6 +128,13 @@ class LockstepRun:
                 nodes.append(observer)
                 self.teams[team.name] = _team_run(made, parts, observer)
             nodes.extend(extra() if extra else [])
+            self.recorder: RecorderNode | None = None
+            if record is not None:
+                told = {"pace": "lockstep", "system": system, **(about or {})}
+                if simulated.text != self.scenario.text:
+                    told["world"] = simulated.text
+                self.recorder = RecorderNode(record, self.scenario, None, namespace, told)
+                nodes.append(self.recorder)
         except BaseException:
             for node in nodes:
                 node.destroy_node()
@@ -142,8 +156,12 @@ class LockstepRun:
         self.close()
 
     def close(self) -> None:
-        """Destroy everything that this run made."""
+        """Destroy everything that this run made. The bag gets all that was published before."""
         if self.spinner is not None:
+            if self.recorder is not None and self.bridge.running:
+                self.bridge.running = False
+                with suppress(NotDiscovered):
+                    Discovery(self.observer, self.spinner).probe()
             self.spinner.close()
         self._stack.close()
 
@@ -164,6 +182,7 @@ class LockstepRun:
                 *(bool(t.supervisor.ready) for t in teams),
                 *(bool(t.planner.ready) for t in teams),
                 *(t.observer.connected for t in teams),
+                self._recorded(),
                 len(self.bridge.commanded()) >= self._commanded,
                 bool(self.bridge.heard_by(self._listeners)),
             )
@@ -174,6 +193,17 @@ class LockstepRun:
             lambda: all(parts()),
         )
         discovery.settle()
+
+    def _recorded(self) -> bool:
+        """Whether the recorder has what every node says of itself before the start. A latched
+        message reaches a late subscriber at any time; it must not be during the run."""
+        if self.recorder is None:
+            return True
+        world = ("map", "scenario", "paused")
+        topics = [self._names.world(t) for t in world]
+        for run in self.teams.values():
+            topics += [run.observer.names.team(t) for t in ("job_state", "status_text")]
+        return all(self.recorder.writer.count(topic) for topic in topics)
 
     def start(self) -> None:
         """Connect and begin to step."""

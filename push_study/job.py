@@ -1,9 +1,8 @@
 """One job of one robot in lockstep, and what it amounts to."""
 
 import hashlib
-from collections.abc import Callable
-
-from rclpy.node import Node
+from collections.abc import Callable, Mapping
+from pathlib import Path
 
 from push_planner import DistanceField, PlannerSettings, PushScene
 from push_scenario.scenario import Scenario
@@ -40,14 +39,15 @@ def min_clearance(scenario: Scenario, trace: Trace) -> float:
 def run_job(
     believed: Scenario,
     world: Scenario,
-    extra: Callable[[], list[Node]] | None = None,
     meanwhile: Callable[[LockstepRun], None] | None = None,
+    record: Path | None = None,
+    about: Mapping[str, str] | None = None,
 ) -> tuple[Row, Trace]:
     """Bring the object to the scenario's goal once; measures, and what was seen.
 
     Parameters
     ----------
-    believed, world, extra: see ``LockstepRun``.
+    believed, world, record, about: see ``LockstepRun``.
     meanwhile: called as soon as the goal is sent; may spin the run.
 
     Raises
@@ -56,7 +56,7 @@ def run_job(
     """
     if believed.goal is None:
         raise ValueError(f"scenario '{believed.name}' has no goal")
-    with LockstepRun(believed, extra, world=world, quiet=True) as run:
+    with LockstepRun(believed, world=world, quiet=True, record=record, about=about) as run:
         run.start()
         state = run.reach(believed.goal, meanwhile=meanwhile)
         trace = run.observer.trace

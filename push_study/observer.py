@@ -38,6 +38,7 @@ class Observer(Node):
     def __init__(self, names: Names, robots: Sequence[str], item: str) -> None:
         """robots: of the team; what is kept of one robot is of the first."""
         super().__init__("observer", namespace=names.team_space.rstrip("/"))
+        self.names = names
         robot = robots[0]
         self._robot, self._item, self._team = robot, item, frozenset(robots)
         self.trace = Trace()
@@ -74,9 +75,10 @@ class Observer(Node):
         publishers = sum(int(self.count_publishers(t)) for t in topics)
         return publishers, sum(int(self.count_subscribers(t)) for t in topics)
 
-    def send_goal(self, goal: Array) -> None:
-        """Publish a goal ``(3,)`` on /goal_pose."""
-        self._goal_publisher.publish(pose_stamped_to_ros(goal, 0.0))
+    def send_goal(self, goal: Array | bytes) -> None:
+        """Publish a goal ``(3,)``, or a serialised message, on /goal_pose."""
+        message = goal if isinstance(goal, bytes) else pose_stamped_to_ros(goal, 0.0)
+        self._goal_publisher.publish(message)
 
     def _on_truth(self, message: Poses) -> None:
         t = self.trace

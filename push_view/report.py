@@ -16,10 +16,11 @@ from push_model import se2
 from push_record.contents import BagContents, Job, load
 from push_view.animation import write_animation
 from push_view.drawing import draw_trajectory
+from push_view.html_report import with_job, write_html
 from push_view.palette import INK
 from push_view.report_panel import draw_report
 
-PRODUCTS = ("trajectory.png", "animation.gif", "report.pdf")
+PRODUCTS = ("trajectory.png", "animation.gif", "report.pdf", "report.html")
 """Files of a report."""
 
 _PAGE = (8.27, 11.69)  # [in] A4
@@ -51,8 +52,9 @@ def final_error(contents: BagContents, job: Job) -> FinalError:
 
 
 def write_report(bag: Path, out: Path, animate: bool = True) -> dict[str, float]:
-    """Write trajectory.png, report.pdf and animation.gif; returns the final errors.
+    """Write trajectory.png, report.pdf, report.html and animation.gif; returns the final errors.
 
+    ``finished`` is 0 if the recording ends in mid-job.
     With several teams, ``position_error_m`` is that of the team farthest from its goal, and
     ``orientation_error_rad`` that of the team turned most.
 
@@ -61,12 +63,7 @@ def write_report(bag: Path, out: Path, animate: bool = True) -> dict[str, float]
     ValueError: the bag holds no scenario.
     """
     contents = load(bag)
-    jobs = list(contents.jobs.values())
-    if not jobs:  # no job was recorded: use the goal of the scenario
-        item = next(iter(contents.scenario.objects), "")
-        jobs = [Job("/", robots=tuple(contents.scenario.robots), object=item)]
-    if len(jobs) == 1 and jobs[0].goal is None:
-        jobs[0].goal = contents.scenario.goal
+    jobs = with_job(contents)
     contents.jobs = {job.space: job for job in jobs}
     errors = {job.space: final_error(contents, job) for job in jobs}
     out.mkdir(parents=True, exist_ok=True)
@@ -82,6 +79,8 @@ def write_report(bag: Path, out: Path, animate: bool = True) -> dict[str, float]
             _first_page(pdf, contents, jobs, errors)
             for job in jobs:
                 _team_page(pdf, contents, job, f"{job.space}   {_line(job, errors[job.space])}")
+    pairs = {space: (error.position, error.orientation) for space, error in errors.items()}
+    write_html(bag, contents, pairs, out / "report.html")
     if animate and len(contents.time):
         write_animation(contents, out / "animation.gif")
     positions = [e.position for e in errors.values() if not np.isnan(e.position)]
@@ -89,13 +88,15 @@ def write_report(bag: Path, out: Path, animate: bool = True) -> dict[str, float]
     return {
         "position_error_m": max(positions, default=float("nan")),
         "orientation_error_rad": max(angles, default=float("nan")),
+        "finished": float(not any(job.unfinished for job in jobs)),
     }
 
 
 def _title(contents: BagContents, jobs: list[Job], errors: dict[str, FinalError]) -> str:
     name = contents.scenario.name
     if len(jobs) == 1:
-        return f"{name}: {errors[jobs[0].space]} from the goal"
+        ends = f" when the recording ends in {jobs[0].unfinished}" if jobs[0].unfinished else ""
+        return f"{name}: {errors[jobs[0].space]} from the goal{ends}"
     return f"{name}: {len(jobs)} teams, {len(contents.poses)} bodies"
 
 
@@ -103,6 +104,10 @@ def _heading(contents: BagContents, jobs: list[Job], errors: dict[str, FinalErro
     meta, hits = contents.metadata, contents.collisions
     duration = float(contents.time[-1] - contents.time[0]) if len(contents.time) else 0.0
     error = f"final error {errors[jobs[0].space]}; " if len(jobs) == 1 else ""
+    if len(jobs) == 1 and jobs[0].unfinished:
+        error = (
+            f"the recording ends in the state {jobs[0].unfinished}, {errors[jobs[0].space]} off; "
+        )
     return (
         f"{contents.scenario.name}   seed {meta.get('seed', '?')}   "
         f"revision {meta.get('revision', '?')}\n"
@@ -115,6 +120,8 @@ def _heading(contents: BagContents, jobs: list[Job], errors: dict[str, FinalErro
 def _line(job: Job, error: FinalError) -> str:
     last = job.states[-1] if job.states else None
     end = "no state" if last is None else f"{last.name.lower()}, code {last.code}"
+    if job.unfinished:
+        end = f"the recording ends in the state {job.unfinished}"
     crew = ", ".join(job.robots) if len(job.robots) <= 5 else f"{len(job.robots)} robots"
     return f"{job.system} ({crew}) with {job.object or 'no object'}: {error}; {end}"
 

@@ -1,10 +1,10 @@
 """Section 2.6, Table 2.1: one robot brings an object to a pose; noise and uncertain friction."""
 
+import json
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import matplotlib
 
@@ -16,12 +16,12 @@ import numpy as np
 from push_model import se2
 from push_model.arrays import Array
 from push_model.settings import SettingsError
-from push_record.recorder import RecorderNode
 from push_ros.claims import own_domain
 from push_scenario.scenario import load_scenario
 from push_study.job import digest, run_job
 from push_study.pool import Row
 from push_study.study import StudyOptions
+from push_study.summary import known
 from push_study.thesis import TABLE_2_1
 from push_study.uncertainty import uncertainty
 from push_view.bodies import bodies_of
@@ -92,10 +92,13 @@ def _push(task: SingleRobotTask) -> Row:
     if task.record and (folder / "bag").exists():
         shutil.rmtree(folder / "bag")  # of this trial, interrupted before its end
 
-    def extra() -> list[Any]:
-        return [RecorderNode(folder / "bag", believed, task.seed)] if task.record else []
-
-    measures, trace = run_job(believed, world, extra)
+    bag = folder / "bag" if task.record else None
+    about = {
+        "experiment": "single-robot",
+        "uncertainty": task.uncertainty,
+        "drawn": json.dumps(known(drawn)),
+    }
+    measures, trace = run_job(believed, world, record=bag, about=about)
     if task.record:
         write_report(folder / "bag", folder / "report")
     np.savez_compressed(

@@ -88,7 +88,7 @@ class Browser:
 
     def mouse(self, kind, x, y, button="left"):
         """kind: mousePressed, mouseMoved or mouseReleased, at a place in CSS pixels."""
-        held = 0 if kind == "mouseReleased" else 1
+        held = 0 if kind == "mouseReleased" else {"left": 1, "right": 2}[button]
         self.call(
             "Input.dispatchMouseEvent",
             type=kind,

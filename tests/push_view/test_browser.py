@@ -95,7 +95,7 @@ def test_a_goal_is_a_drag_and_nothing_else_is(shown):
     shown.mouse("mouseReleased", shown.drag(start, 0.0, 0.0))
     shown.mouse("mouseReleased", shown.drag(start, 20.0, 1.0))
     shown.mouse("mouseReleased", shown.drag(start, 80.0, 1.0, button="right"), "right")
-    shown.mouse("mouseMoved", start)
+    shown.mouse("mouseMoved", (start[0] + 1.0, start[1]))
     shown.until("!document.getElementById('cursor').textContent.startsWith('x 0.9')")
     shown.value("document.getElementById('whole').click()")
     shown.mouse("mouseMoved", shown.pixel(0.0, 0.0))
