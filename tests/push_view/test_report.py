@@ -19,6 +19,7 @@ from push_view.report import PRODUCTS, final_error, write_report
 from sim_bridge.world import Contact
 
 TYPES = {
+    "group_plan": "push_msgs/msg/GroupPlan",
     "ground_truth/poses": "push_msgs/msg/Poses",
     "contacts": "push_msgs/msg/Contacts",
     "job_state": "push_msgs/msg/JobState",

@@ -1,0 +1,129 @@
+"""Bags on the page: what is sent, and what a browser shows of it."""
+
+import json
+import time
+
+import numpy as np
+import pytest
+
+from planar_push.main import main
+from push_msgs.msg import GroupPlan, JobState
+from push_view.playback import playback_json
+from push_view.playback_server import PlaybackServer
+from tests.push_view.browser import CHROMIUM, Browser
+from tests.push_view.test_report import Bag, crowd
+
+
+def written(scenario, folder, speed=0.1, begin=5.0):
+    """Ten seconds of a robot and a box that go along x, with a job from the second second on."""
+    bag = Bag(folder, crowd(scenario, 1, 1))
+    for i in range(501):
+        t = begin + 0.02 * i
+        bag.poses(
+            {
+                "r0": np.array([speed * 0.02 * i, 0, 0]),
+                "box0": np.array([0.1, speed * 0.02 * i, 0]),
+            },
+            t,
+        )
+        if i in (100, 400):
+            state = JobState(system="group", robots=["r0"], object="box0", job=1)
+            state.state_name, state.reason = ("PUSHING", "on") if i == 100 else ("IDLE", "reached")
+            state.header.stamp.sec, state.header.stamp.nanosec = int(t), round(1e9 * (t % 1.0))
+            state.goal.header.frame_id = "map"
+            state.goal.pose.position.x, state.goal.pose.position.y = 0.1, speed * 10.0
+            state.goal.pose.orientation.w = 1.0
+            bag.write("/job_state", state, t)
+        if i in (150, 250):  # two pieces of one way
+            plan = GroupPlan(object="box0", pushers=["r0"], x=[0.1, 0.1], y=[0.0, i / 100.0])
+            for name in ("way", "contact_x", "contact_y", "normal_x", "normal_y", "force"):
+                setattr(plan, name, [1.0])
+            for name in ("time", "theta", "vx", "vy", "omega"):
+                setattr(plan, name, [0.0, 1.0])
+            bag.write("/group_plan", plan, t)
+    return bag.close()
+
+
+def test_what_is_sent_of_a_bag(scenario, tmp_path):
+    data = json.loads(json.dumps(playback_json(written(scenario, tmp_path / "a")), allow_nan=False))
+    assert data["name"] == "a" and data["bodies"]["names"] == ["r0", "box0"]
+    x, y, _ = data["poses"][1]
+    assert len(x) == len(data["t"]) == 501 and (x[0], y[0], y[-1]) == (1000, 0, 10000)
+    (team,) = data["teams"]
+    assert [(s["t"], s["state"]) for s in team["states"]] == [(7.0, "PUSHING"), (13.0, "IDLE")]
+    assert [len(p["pushes"]) for p in team["plans"]] == [1, 2]
+    assert [p["t"] for p in team["plans"]] == pytest.approx([8.0, 10.0], abs=0.021)
+    error = team["series"]["position error"]
+    assert error["t"][0] == 7.0 and error["v"][0] == pytest.approx(0.8, abs=1e-3)
+    assert error["v"][-1] == pytest.approx(0.0, abs=1e-6) and error["unit"] == "m"
+    hall = crowd(scenario, 1, 1).environment
+    assert data["bodies"]["obstacles"]["size"] == list(hall.size)
+
+
+def test_a_long_bag_of_many_bodies_is_thinned(scenario, tmp_path, monkeypatch):
+    monkeypatch.setattr("push_view.playback._VALUES", 600)
+    data = playback_json(written(scenario, tmp_path / "a"))
+    assert len(data["t"]) == 100 and data["t"][0] == 5.0 and data["t"][-1] == 15.0
+
+
+def test_wrong_arguments_are_told(scenario, tmp_path, capsys):
+    bag = str(written(scenario, tmp_path / "a"))
+    for words, expected in (
+        (["play", bag, bag, "--publish"], "--publish plays one bag"),
+        (["play", bag, "--factor", "2"], "--factor and --namespace belong to --publish"),
+    ):
+        assert main(words) == 2
+        assert expected in capsys.readouterr().err
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")
+def test_two_bags_side_by_side_in_a_browser(scenario, tmp_path):
+    """Of two lengths of way, with stamps that begin at different times."""
+    bags = [written(scenario, tmp_path / "slow"), written(scenario, tmp_path / "fast", 0.2, 100.0)]
+    server = PlaybackServer(bags, "127.0.0.1", 0)
+    browser = Browser(tmp_path / "profile")
+    try:
+        browser.open(f"http://127.0.0.1:{server.port}/")
+        wait(browser, "document.getElementById('slider')")
+        assert browser.value("document.querySelectorAll('canvas[id^=scene]').length") == 2
+        assert browser.value("Number(document.getElementById('slider').max)") == pytest.approx(10.0)
+        legend = "[...document.querySelectorAll('.chart')][0].textContent"
+        assert all(name in browser.value(legend) for name in ("slow", "fast"))
+        shown = "document.getElementById('numbers').textContent"
+        took = []
+        for t in (9.5, 0.5, 4.0):
+            took.append(browser.value(seek(t)))
+            text = browser.value(shown)
+            assert f"time{t:.1f} s" in text
+        print(f"seeks: {max(took):.0f} ms at most")  # depends on the machine
+        assert "600.0 mm" in browser.value(shown)  # 0.4 m of 1 m are done
+        assert browser.value("document.querySelectorAll('#log button').length") == 1
+        browser.value("document.getElementById('team').value = 1")
+        browser.value("document.getElementById('team').dispatchEvent(new Event('change'))")
+        wait(browser, f"{shown}.includes('1200.0 mm')")
+        browser.value("document.querySelector('#log button').click()")  # to the begin of the job
+        wait(browser, "document.getElementById('now').textContent.startsWith('2.00')")
+        browser.value("document.getElementById('on').click()")
+        wait(browser, "document.getElementById('now').textContent.startsWith('2.02')")
+        browser.value("document.getElementById('go').click()")
+        wait(browser, "parseFloat(document.getElementById('now').textContent) > 2.5")
+        assert browser.errors == []
+    finally:
+        browser.close()
+        server.close()
+
+
+def wait(browser, expression):
+    end = time.monotonic() + 10.0
+    while not browser.value(f"Boolean({expression})"):
+        assert time.monotonic() < end, browser.value("document.body.innerText")
+        time.sleep(0.05)
+
+
+def seek(t):
+    """Move the slider; answers [ms] until the picture has been drawn."""
+    return f"""new Promise(done => {{
+      const begun = performance.now(), s = document.getElementById('slider');
+      s.value = {t}; s.dispatchEvent(new Event('input'));
+      const drawn = () => done(performance.now() - begun);
+      requestAnimationFrame(() => requestAnimationFrame(drawn)); }})"""
