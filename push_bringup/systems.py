@@ -46,6 +46,12 @@ def _absolute(namespace: str) -> str:
     return space(namespace).rstrip("/") or "/"
 
 
+def _bridge(scenario: Scenario, world: str) -> NodeSpec:
+    """The node that connects to the world: to a simulated one, or to a lab."""
+    kind = "lab_bridge" if scenario.on == "lab" else "bridge"
+    return NodeSpec("bridge", kind, world, world)
+
+
 def single(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
     """One robot that pushes one object, for each team; all in one world.
 
@@ -56,7 +62,7 @@ def single(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
     SettingsError: a team has not one robot, or no object.
     """
     world = _absolute(namespace)
-    nodes = [NodeSpec("bridge", "bridge", world, world)]
+    nodes = [_bridge(scenario, world)]
     for team in teams_of(scenario):
         if len(team.robots) != 1:
             whose = f"team '{team.name}'" if team.name else "its only team"
@@ -91,7 +97,7 @@ def torque(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
             f"scenario '{scenario.name}': none of its robots is driven by wheel torques"
         )
     return (
-        NodeSpec("bridge", "bridge", world, world),
+        _bridge(scenario, world),
         *(
             NodeSpec(f"{n}/controller", "torque_controller", inside(namespace, n), world, n)
             for n in driven
@@ -107,7 +113,7 @@ def method(name: str, scenario: Scenario, namespace: str = "") -> tuple[NodeSpec
     SettingsError: there is no such method, or a team is not one that it can drive.
     """
     world = _absolute(namespace)
-    nodes = [NodeSpec("bridge", "bridge", world, world)]
+    nodes = [_bridge(scenario, world)]
     spec = {"group": GROUP, "swarm": SWARM}.get(name) or method_spec(name)
     if spec is None:
         raise SettingsError(
