@@ -16,6 +16,7 @@ from rclpy.node import Node
 from grasp_opt.group_method import GROUP
 from grasp_opt.placement import PlacementSettings
 from grasp_opt.step_settings import StepSettings
+from lab_bridge.settings import LabBridgeSettings
 from push_estimation.pose_gate import PoseGateSettings
 from push_job.method import MethodSpec, method_names, method_spec
 from push_model.settings import SettingsError
@@ -152,6 +153,12 @@ KINDS: dict[str, NodeKind] = {
             "motion_capture": MotionCaptureSettings,
             "physics": PhysicsSettings,
         },
+    ),
+    "lab_bridge": NodeKind(
+        "lab_bridge.node",
+        "LabBridgeNode",
+        lambda s: {"namespace": s.namespace},
+        sections={"": LabBridgeSettings, **_GATED},
     ),
     "planner": NodeKind(
         "push_planner.node",

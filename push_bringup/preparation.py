@@ -66,6 +66,8 @@ def prepare(
     made = changed(made, parameters or {})
     made = changed(made, LIVE, only_missing=True)
     if factor is not None:
+        if made.on == "lab":
+            raise SettingsError("a lab runs in real time; leave the factor out")
         made = made.settings("bridge", real_time_factor=float(factor))
     made = resolved(made)
     nodes = nodes_of(system, made, namespace)
@@ -93,7 +95,7 @@ def check_domain(namespace: str = "", context: Any = None) -> None:
         domain = str(context.get_domain_id())
     here = space(namespace)
     if not world_is_claimed(domain, here) and not has_publisher(
-        f"{here}poses", _DISCOVERY, context
+        f"{here}poses", _DISCOVERY, context, "push_msgs/msg/Poses"
     ):
         return
     where = f" in namespace {namespace.strip('/')}" if namespace.strip("/") else ""

@@ -47,6 +47,12 @@ def _absolute(namespace: str) -> str:
     return space(namespace).rstrip("/") or "/"
 
 
+def _bridge(scenario: Scenario, world: str) -> NodeSpec:
+    """The node that connects to the world: to a simulated one, or to a lab."""
+    kind = "lab_bridge" if scenario.on == "lab" else "bridge"
+    return NodeSpec("bridge", kind, world, world)
+
+
 def single(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
     """Nodes of the system ``single``: in each team, one robot pushes one object.
 
@@ -57,7 +63,7 @@ def single(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
     SettingsError: a team does not have exactly one robot, or has no object.
     """
     world = _absolute(namespace)
-    nodes = [NodeSpec("bridge", "bridge", world, world)]
+    nodes = [_bridge(scenario, world)]
     for team in teams_of(scenario):
         if len(team.robots) != 1:
             whose = f"team '{team.name}'" if team.name else "its only team"
@@ -96,7 +102,7 @@ def torque(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
             "needs a robot type with 'drive: {kind: torque}'"
         )
     return (
-        NodeSpec("bridge", "bridge", world, world),
+        _bridge(scenario, world),
         *(
             NodeSpec(f"{n}/controller", "torque_controller", inside(namespace, n), world, n)
             for n in driven
@@ -112,7 +118,7 @@ def method(name: str, scenario: Scenario, namespace: str = "") -> tuple[NodeSpec
     SettingsError: there is no such method, or it cannot command the robots of a team.
     """
     world = _absolute(namespace)
-    nodes = [NodeSpec("bridge", "bridge", world, world)]
+    nodes = [_bridge(scenario, world)]
     spec = {"group": GROUP, "swarm": SWARM}.get(name) or method_spec(name)
     if spec is None:
         raise SettingsError(

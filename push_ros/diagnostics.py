@@ -1,5 +1,6 @@
 """/diagnostics: one status a node, with its counters and its complaints."""
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -66,6 +67,10 @@ class Diagnostics:
         found = []
         for topic in self._single:
             count = int(self._node.count_publishers(topic))
+            if count > 1:  # of one type: those of another one are not heard
+                infos = self._node.get_publishers_info_by_topic(topic)
+                kinds = Counter(info.topic_type for info in infos)
+                count = max(kinds.values(), default=0)
             if count > 1:
                 found.append(f"{count} publishers on {topic}")
                 if topic not in self.rivals:

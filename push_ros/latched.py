@@ -52,7 +52,21 @@ def hear_latched(message_type: Any, topic: str, limit: float, context: Any = Non
     return heard[-1] if heard else None
 
 
-def has_publisher(topic: str, limit: float, context: Any = None) -> bool:
-    """Whether somebody publishes on a topic; he has limit [s] of wall time to be discovered."""
+def publishers(node: Node, topic: str, kind: str = "") -> int:
+    """How many publish on a topic, of one type where it is given, e.g. ``push_msgs/msg/Poses``.
+
+    A motion-capture driver may use the name of one of our topics for a type of its own.
+    """
+    count = int(node.count_publishers(topic))
+    if not count or not kind:
+        return count
+    return sum(i.topic_type == kind for i in node.get_publishers_info_by_topic(topic))
+
+
+def has_publisher(topic: str, limit: float, context: Any = None, kind: str = "") -> bool:
+    """Whether somebody publishes on a topic; he has limit [s] of wall time to be discovered.
+
+    kind: type of the messages; any where it is not given.
+    """
     with visitor(context) as (node, spinner):
-        return spinner.until(lambda: int(node.count_publishers(topic)) > 0, limit)
+        return spinner.until(lambda: publishers(node, topic, kind) > 0, limit)

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from push_model.arrays import Array
 from push_model.occupancy import MapSpec, OccupancyGrid, rasterise
@@ -25,6 +25,7 @@ from push_scenario.files import (
     read_yaml,
     scenario_names,
 )
+from push_scenario.lab import LabSettings, check_lab
 from push_scenario.map_file import is_map, load_map, map_to_mapping
 from push_scenario.poses import PoseValue, to_value
 from push_scenario.room import Room
@@ -65,8 +66,16 @@ class ScenarioFile:
     teams: dict[str, TeamEntry] = field(default_factory=dict)
     events: tuple[Event, ...] = bounded((), doc="Events while the scenario runs")
     parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
+    on: Literal["sim", "lab"] = bounded(
+        "sim", doc="Whether the robots are simulated, or are those of the section lab"
+    )
+    lab: LabSettings | None = bounded(None, doc="Drivers of real robots and of motion capture")
 
     def __post_init__(self) -> None:
+        if self.on == "lab" and self.lab is None:
+            raise SettingsError("'on: lab' needs the section 'lab' with its drivers")
+        if self.on == "lab" and self.events:
+            raise SettingsError("events happen in simulation only; remove them for 'on: lab'")
         check_aims(self.goal, self.goals, self.trajectory)
         if self.teams and (self.goal is not None or self.goals or self.trajectory):
             raise SettingsError("with teams, goals belong to the teams, not to the scenario")
@@ -82,6 +91,7 @@ class Scenario:
     parameters: node name to a mapping of that node's settings.
     goals: poses ``(3,)`` one after another, of a scenario without teams; or trajectory.
     teams: by name; empty when all robots are one team. events: in the order of time.
+    on: "sim" or "lab". lab: drivers of the lab, None where the file has none.
     """
 
     name: str
@@ -93,6 +103,8 @@ class Scenario:
     trajectory: tuple[TimedPose, ...] = ()
     teams: dict[str, Team] = field(default_factory=dict)
     events: tuple[Event, ...] = ()
+    on: str = "sim"
+    lab: LabSettings | None = None
 
     @property
     def goal(self) -> Array | None:
@@ -122,6 +134,8 @@ class Scenario:
             values.update(aims_to_mapping(self.goals, self.trajectory))
         values["events"] = [asdict(e) for e in self.events]
         values["parameters"] = self.parameters
+        if self.lab is not None:
+            values |= {"on": self.on, "lab": _plain(asdict(self.lab))}
         return dump_yaml(values)
 
     @property
@@ -225,7 +239,9 @@ def scenario_from_mapping(
     if not isinstance(values, Mapping):
         raise SettingsError(f"{where}: expected a mapping, got {values!r}")
     needed = ("environment", "robots")
-    given = {k: v for k, v in values.items() if v is not None or k in needed}
+    # YAML 1.1 reads the key ``on`` as the truth value
+    named = {"on" if k is True else k: v for k, v in values.items()}
+    given = {k: v for k, v in named.items() if v is not None or k in needed}
     file = from_mapping(ScenarioFile, given, where)
     environment = _environment(file.environment, f"{where}.environment", folder)
     robots = read_groups(RobotSpec, "robots", file.robots, f"{where}.robots", folder)
@@ -247,7 +263,11 @@ def scenario_from_mapping(
         trajectory=file.trajectory,
         teams=made_teams(file.teams, groups, names, f"{where}.teams"),
         events=tuple(sorted(file.events, key=lambda e: e.at)),
+        on=file.on,
+        lab=file.lab,
     )
+    if file.lab is not None:
+        check_lab(file.lab, tuple(scenario.robots), tuple(scenario.objects), f"{where}.lab")
     scenario.check(where)
     return scenario
 
@@ -275,6 +295,13 @@ def _bodies_to_mapping(bodies: Mapping[str, tuple[Any, Array]]) -> dict[str, Any
         if spec not in written:
             written[spec] = asdict(spec)
     return {n: {"type": written[s], "start": to_value(p)} for n, (s, p) in bodies.items()}
+
+
+def _plain(value: Any) -> Any:
+    """Lists instead of tuples, as YAML has them."""
+    if isinstance(value, Mapping):
+        return {k: _plain(v) for k, v in value.items()}
+    return [_plain(v) for v in value] if isinstance(value, (list, tuple)) else value
 
 
 def _pick(name: str, known: Mapping[str, Any], kind: str) -> tuple[str, Any]:

@@ -21,6 +21,7 @@ from push_bringup.suite import scenario_goals
 from push_bringup.systems import LOCKSTEP, nodes_of, teams_of
 from push_model.arrays import Array
 from push_model.jobs import JobError
+from push_model.settings import SettingsError
 from push_msgs.msg import JobState
 from push_record.recorder import RecorderNode
 from push_ros.claims import claim_domain
@@ -108,6 +109,8 @@ class LockstepRun:
             resolved(changed(s.settings("bridge", lockstep=True), LOCKSTEP, only_missing=True))
             for s in (scenario, world or scenario)
         )
+        if scenario.on != "sim":
+            raise SettingsError(f"'{scenario.name}' is for a lab; a run in lockstep is simulated")
         specs = nodes_of(system, scenario, namespace)
         if not rclpy.ok():
             rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)

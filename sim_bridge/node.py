@@ -14,7 +14,9 @@ from push_model.arrays import Rows
 from push_model.se2 import compose, pose
 from push_model.settings import SettingsError
 from push_msgs.srv import Displace, Kill, LoadScenario, Reset
+from push_ros.command_intake import CommandIntake
 from push_ros.diagnostics import Diagnostics
+from push_ros.lone_bridge import refuse_second_bridge
 from push_ros.names import Names, space
 from push_ros.parameters import declare_settings
 from push_ros.process import run_node
@@ -22,9 +24,7 @@ from push_ros.validation import FARTHEST
 from push_scenario.events import Event
 from push_scenario.footing import Footing
 from push_scenario.scenario import Scenario, load_scenario
-from sim_bridge.command_intake import CommandIntake
 from sim_bridge.disturbances import Disturbances, displace
-from sim_bridge.lone_bridge import refuse_second_bridge
 from sim_bridge.motion_capture import MotionCapture
 from sim_bridge.pace import Lockstep, RealTime
 from sim_bridge.settings import BridgeSettings, MotionCaptureSettings

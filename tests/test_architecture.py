@@ -20,6 +20,7 @@ FLOORS = [
         "grasp_opt",
         "swarm_push",
         "sim_bridge",
+        "lab_bridge",
         "push_record",
     },
     {"push_bringup", "push_view"},

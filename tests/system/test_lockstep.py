@@ -32,7 +32,7 @@ NODE_MODULES = (
     "push_ros.pace_feed",
     "push_mpc.follower_node",
     "sim_bridge.node",
-    "sim_bridge.command_intake",
+    "push_ros.command_intake",
 )
 """Where the nodes of one robot look at the wall clock, but the planner's."""
 

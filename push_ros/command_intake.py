@@ -1,15 +1,15 @@
 """Commands to robots: from a topic each, or from one message for many; through the gate."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from geometry_msgs.msg import TwistStamped
 from rclpy.node import Node
 
-from push_model.arrays import Mask, Rows
+from push_model.arrays import Array, Mask, Rows
 from push_model.drives import HolonomicDrive, TorqueDrive
 from push_model.specs import RobotSpec
 from push_msgs.msg import Velocities, WheelTorques
@@ -19,11 +19,31 @@ from push_ros.diagnostics import Diagnostics
 from push_ros.names import Names
 from push_ros.qos import COMMAND
 from push_ros.validation import FRAME
-from sim_bridge.world import World
 
 _ABSURD = 10.0
 """Commands beyond so many times what a robot can do are refused, not scaled down."""
 _OWN_FRAMES = ("", "base_link")
+
+
+class Commanded(Protocol):
+    """What obeys: the robots of a simulated world, or those of a lab."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Bodies that are there, robots among them."""
+        ...
+
+    def command(self, robot: str, v: float, omega: float) -> None:
+        """Set a robot's twist [m/s, rad/s] in its own frame; it holds until the next command."""
+        ...
+
+    def command_all(self, robots: Sequence[str], twists: Array, fixed_frame: bool = False) -> None:
+        """Set the twists ``(n, 3)`` of several robots, in their own frames or in the world's."""
+        ...
+
+    def command_torques(self, robot: str, left: float, right: float) -> None:
+        """Set the torques [Nm] of a robot's wheels; they hold until the next command."""
+        ...
 
 
 class CommandIntake:
@@ -44,7 +64,7 @@ class CommandIntake:
         self._node, self._names, self._diagnostics = node, names, diagnostics
         self._answered = answered
         self.now = 0.0
-        """[s] Sim time."""
+        """[s] on the clock of the poses."""
         self.changed = False
         """Whether commanded() may have changed since it was asked."""
         self.unseen: Rows = np.zeros(0, dtype=np.intp)
@@ -56,10 +76,12 @@ class CommandIntake:
         self._own_inputs: list[Any] = []
         self.gate = CommandGate((), Limits(np.zeros((0, 3)), np.zeros(0), 0.0, 0.0))
 
-    def connect(self, world: World, robots: dict[str, RobotSpec], age: float, wall: float) -> None:
-        """Take commands for the robots of a world.
+    def connect(
+        self, world: Commanded, robots: dict[str, RobotSpec], age: float, wall: float
+    ) -> None:
+        """Take commands for the robots of a world or of a lab.
 
-        age: [s] of the oldest fresh command, in sim time; wall: [s] of wall time.
+        age: [s] of the oldest fresh command, on the clock of the poses; wall: [s] of wall time.
         """
         self._world = world
         drives = [spec.drive for spec in robots.values()]
@@ -179,7 +201,7 @@ class CommandIntake:
             self.unseen = self.gate.rows(sorted(robots))
 
     def watch(self, now: float) -> Rows:
-        """Stop robots that drive without a fresh command at sim time now [s]; their rows."""
+        """Stop robots that drive without a fresh command at a time now [s]; their rows."""
         rows: Rows = self.gate.silent(now, time.monotonic())
         if rows.size:
             self.stop(rows)

@@ -1,0 +1,1 @@
+"""The bridge to a lab: poses of a real motion capture in, commands to real robots out."""
