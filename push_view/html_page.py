@@ -6,15 +6,18 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-_FOLDER = Path(__file__).parent / "report_page"
+from push_view.bundle import bundle
+
+_PAGE = Path(__file__).parent / "page"
+_REPORT = Path(__file__).parent / "report_page"
+_STYLES = (_PAGE / "vendor/uPlot.min.css", _PAGE / "page.css", _REPORT / "report.css")
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
 
 
-def page(title: str, body: str, scripts: Sequence[str], data: Any) -> str:
-    """The text of a file. body: HTML. scripts: names in ``push_view/report_page``. data: is read
-    by the scripts as JSON."""
-    style = (_FOLDER / "report.css").read_text(encoding="utf-8")
-    code = "\n".join((_FOLDER / name).read_text(encoding="utf-8") for name in scripts)
+def page(title: str, body: str, script: str, data: Any) -> str:
+    """The text of a file. body: HTML. script: JavaScript. data: is in an element ``data`` as
+    JSON."""
+    style = "\n".join(path.read_text(encoding="utf-8") for path in _STYLES)
     inline = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
     return f"""<!doctype html>
 <html lang="en">
@@ -26,14 +29,33 @@ def page(title: str, body: str, scripts: Sequence[str], data: Any) -> str:
 <style>
 {style}</style>
 </head>
-<body>
+<body class="report">
 {body}
 <script type="application/json" id="data">{inline}</script>
 <script>
-{code}</script>
+{script}</script>
 </body>
 </html>
 """
+
+
+def frame() -> str:
+    """The elements of the page in which a bag is played back."""
+    text = (_PAGE / "index.html").read_text(encoding="utf-8")
+    inside = text[text.index("<body>") + len("<body>") : text.index("</body>")]
+    return f'<div class="frame" id="frame">{inside}</div>'
+
+
+def player() -> str:
+    """The script that plays back the bags of the element ``data``."""
+    plot = (_PAGE / "vendor/uPlot.iife.min.js").read_text(encoding="utf-8")
+    begin = 'modules.play.begin({data: JSON.parse(document.getElementById("data").textContent)});'
+    return f"{plot}\n{bundle('play')}\n{begin}\n"
+
+
+def study_script() -> str:
+    """The script of the report of a study."""
+    return (_REPORT / "study.js").read_text(encoding="utf-8")
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[Any]], kind: str = "") -> str:

@@ -10,10 +10,10 @@ import numpy as np
 
 from push_record.contents import BagContents, Job
 from push_record.faults import Fault, faults_of
-from push_view.html_page import Markup, page, table
-from push_view.report_data import report_data
+from push_view.html_page import Markup, frame, page, player, table
+from push_view.playback import contents_json
 
-SCRIPTS = ("report_map.js", "report_charts.js", "report.js")
+_VALUES = 240_000  # numbers of poses in a file
 
 
 def write_html(
@@ -28,13 +28,9 @@ def write_html(
     faults = faults_of(bag, contents)
     parts = [
         _head(contents),
-        _scene(),
+        frame(),
         "<h2>Results</h2>",
         _results(contents, errors),
-        "<h2>Charts</h2>",
-        '<p class="soft">A click on a chart moves the map to its time. Grey bands: states of the '
-        "first job.</p>",
-        '<div id="charts"></div>',
         "<h2>Timing</h2>",
         _timing(contents),
         "<h2>Faults</h2>",
@@ -44,8 +40,8 @@ def write_html(
         f"<pre>{html.escape(contents.scenario.text)}</pre></details>",
     ]
     title = f"{contents.scenario.name} – planar-push"
-    text = page(title, "\n".join(parts), SCRIPTS, report_data(contents, faults))
-    out.write_text(text, encoding="utf-8")
+    data = [contents_json(contents, contents.scenario.name, _VALUES)]
+    out.write_text(page(title, "\n".join(parts), player(), data), encoding="utf-8")
 
 
 def _head(contents: BagContents) -> str:
@@ -59,22 +55,6 @@ def _head(contents: BagContents) -> str:
     words += [f"{key} {meta[key]}" for key in ("system", "pace", "experiment") if key in meta]
     line = html.escape(" · ".join(words))
     return f'<h1>{html.escape(contents.scenario.name)}</h1><p class="soft">{line}</p>'
-
-
-def _scene() -> str:
-    return """<div id="scene">
-<canvas id="map"></canvas>
-<div id="controls">
-<button id="play" aria-label="play or pause">▶</button>
-<input id="time" type="range" min="0" max="1000" value="0" aria-label="time">
-<output id="clock"></output>
-<select id="speed" aria-label="speed"><option value="0.5">½ ×</option>
-<option value="1" selected>1 ×</option><option value="4">4 ×</option>
-<option value="16">16 ×</option></select>
-</div>
-<div id="legend"></div>
-<p id="state" class="soft"></p>
-</div>"""
 
 
 def _results(contents: BagContents, errors: Mapping[str, tuple[float, float]]) -> str:
@@ -142,7 +122,7 @@ def _faults(faults: Sequence[Fault]) -> str:
 def _fault_rows(faults: Iterable[Fault]) -> Iterable[tuple[Any, ...]]:
     for fault in faults:
         known = math.isfinite(fault.time)
-        time = f'<a href="#scene" data-time="{fault.time:.3f}">{fault.time:.2f}</a>'
+        time = f'<a href="#frame" data-time="{fault.time:.3f}">{fault.time:.2f}</a>'
         yield Markup(time) if known else "–", fault.kind, fault.where, fault.text
 
 

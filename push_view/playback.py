@@ -14,7 +14,9 @@ from push_view.page_data import obstacles_json, plan_json, rows_json, shapes_jso
 
 _MOMENTS = 0.25  # [s] between two reports
 _FRAMES = 20_000  # frames that are sent at most
-_VALUES = 3_000_000  # numbers of poses that are sent at most
+VALUES = 3_000_000
+"""Numbers of poses that are sent at most."""
+
 _POINTS = 3000  # of a series
 
 
@@ -28,12 +30,16 @@ def playback_json(bag: Path, name: str = "") -> dict[str, Any]:
     ------
     ValueError: the bag holds no scenario. FileNotFoundError: it is none.
     """
-    contents = load(bag, _MOMENTS)
+    return contents_json(load(bag, _MOMENTS), name or bag.name, VALUES)
+
+
+def contents_json(contents: BagContents, name: str, values: int) -> dict[str, Any]:
+    """The contents of a bag as JSON for the page. values: numbers of poses at most."""
     bodies = bodies_of(contents.scenario)
-    frames = _frames(len(contents.time), len(bodies))
+    frames = _frames(len(contents.time), len(bodies), values)
     jobs = [job for job in contents.jobs.values() if job.states]
     return {
-        "name": name or bag.name,
+        "name": name,
         "scenario": contents.scenario.name,
         "metadata": {k: v for k, v in contents.metadata.items() if k != "scenario"},
         "extent": [float(v) for v in contents.scenario.grid.extent],
@@ -48,9 +54,9 @@ def playback_json(bag: Path, name: str = "") -> dict[str, Any]:
     }
 
 
-def _frames(count: int, bodies: int) -> Array:
+def _frames(count: int, bodies: int, values: int) -> Array:
     """Indices of the frames that are sent."""
-    most = min(count, _FRAMES, max(2, _VALUES // (3 * max(bodies, 1))))
+    most = min(count, _FRAMES, max(2, values // (3 * max(bodies, 1))))
     return np.unique(np.linspace(0, max(count - 1, 0), most).astype(int)) if count else _NONE
 
 

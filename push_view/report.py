@@ -24,6 +24,7 @@ PRODUCTS = ("trajectory.png", "animation.gif", "report.pdf", "report.html")
 """Files of a report."""
 
 _PAGE = (8.27, 11.69)  # [in] A4
+_MOMENTS = 1.0  # [s] between two reports whose shapes are shown
 _ROWS = 24  # teams in the list on the first page
 
 
@@ -62,7 +63,7 @@ def write_report(bag: Path, out: Path, animate: bool = True) -> dict[str, float]
     ------
     ValueError: the bag holds no scenario.
     """
-    contents = load(bag)
+    contents = load(bag, _MOMENTS)
     jobs = with_job(contents)
     contents.jobs = {job.space: job for job in jobs}
     errors = {job.space: final_error(contents, job) for job in jobs}

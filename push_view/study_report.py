@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from push_model.settings import SettingsError
-from push_view.html_page import Markup, page, table
+from push_view.html_page import Markup, page, study_script, table
+from push_view.palette import ROBOTS
 
-SCRIPTS = ("report_map.js", "report_charts.js", "study.js")
 _NOT_PLACES = ("reason", "success", "crashed")
 _GROUPS = 12  # values of such a column at most
 
@@ -46,8 +46,8 @@ def write_study_report(folder: Path, out: Path) -> int:
         _trials(rows),
         _files(folder, out.parent),
     ]
-    data = {"measures": measures(rows, by), "by": by}
-    text = page(f"{name} – planar-push", "\n".join(parts), SCRIPTS, data)
+    data = {"measures": measures(rows, by), "by": by, "palette": ROBOTS}
+    text = page(f"{name} – planar-push", "\n".join(parts), study_script(), data)
     out.write_text(text, encoding="utf-8")
     return len(rows)
 

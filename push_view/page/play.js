@@ -92,11 +92,12 @@ function makeChoice() {
   at("team").onchange = event => { chosen = all[Number(event.target.value)]; soon(); };
 }
 
-export async function begin({bags}) {
+// bags: paths that bags are fetched from; data: bags that are there already
+export async function begin({bags = [], data = null}) {
   document.body.classList.add("playback");
   at("state").textContent = "reading"; at("reason").textContent = "";
   try {
-    recordings = (await Promise.all(bags.map(get))).map(data => new Recording(data));
+    recordings = (data ?? await Promise.all(bags.map(get))).map(bag => new Recording(bag));
   } catch (error) {
     at("trouble").hidden = false; at("trouble").textContent = `the bag cannot be shown: ${error.message}`;
     return;
@@ -105,6 +106,9 @@ export async function begin({bags}) {
   at("hint").textContent = "drag to move the map, turn the wheel to zoom; space plays, arrows step; click a chart or the log to jump";
   charts = new Charts(at("charts"), seek);
   makeViews(); makeTimeline(); makeChoice();
+  for (const link of document.querySelectorAll("[data-time]")) {
+    link.addEventListener("click", () => seek(Number(link.dataset.time) - recordings[0].begin));
+  }
   frame = setUp(scenes, model, soon);
-  soon();
+  seek(data ? longest() : 0);   // a report begins with the result
 }

@@ -2,7 +2,41 @@
 // A study: each measure with all its trials, and tables that can be sorted.
 
 const data = JSON.parse(document.getElementById("data").textContent);
-const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#8a7a00", "#7f7f7f"];
+const SVG = "http://www.w3.org/2000/svg";
+const WIDE = 520, RIGHT = 18, TOP = 8, BOTTOM = 22;
+
+const element = (name, values = {}, parent = null, text = "") => {
+  const made = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(values)) made.setAttribute(key, value);
+  if (text) made.textContent = text;
+  if (parent) parent.append(made);
+  return made;
+};
+
+// Round steps of which about `count` fit between two numbers.
+const ticks = (low, high, count) => {
+  const raw = (high - low) / count || 1, power = 10 ** Math.floor(Math.log10(raw));
+  const step = power * [1, 2, 5, 10].find((s) => s * power >= raw - 1e-12);
+  const found = [];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k += 1) found.push(k * step);
+  return found;
+};
+
+const short = (value) => {
+  if (value === null || value === undefined) return "–";
+  const size = Math.abs(value);
+  if (size >= 1e5 || (size > 0 && size < 1e-3)) return value.toExponential(1);
+  return String(+value.toPrecision(4));
+};
+
+// A colour as it can be read on a dark ground: mixed with white there.
+const dark = () => matchMedia("(prefers-color-scheme: dark)").matches;
+const shade = (colour) => {
+  if (!dark() || !/^#[0-9a-f]{6}$/i.test(colour)) return colour;
+  const parts = [1, 3, 5].map((k) => parseInt(colour.slice(k, k + 2), 16));
+  return "#" + parts.map((v) => Math.round(v + 0.35 * (255 - v)).toString(16).padStart(2, "0")).join("");
+};
+
 
 function strip(measure) {
   const names = Object.keys(measure.groups), row = 24, left = 130;
@@ -20,7 +54,7 @@ function strip(measure) {
     element("text", { x: x(v), y: high - 6, "text-anchor": "middle" }, svg, short(v));
   }
   names.forEach((name, k) => {
-    const pairs = measure.groups[name], y = TOP + row * (k + 0.5), colour = shade(COLOURS[k % COLOURS.length]);
+    const pairs = measure.groups[name], y = TOP + row * (k + 0.5), colour = shade(data.palette[k % data.palette.length]);
     const mean = pairs.reduce((sum, pair) => sum + pair[0], 0) / pairs.length;
     const spread = Math.sqrt(pairs.reduce((sum, pair) => sum + (pair[0] - mean) ** 2, 0) / pairs.length);
     const a = x(Math.max(low, mean - spread)), b = x(Math.min(top, mean + spread));

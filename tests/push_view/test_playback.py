@@ -61,7 +61,7 @@ def test_what_is_sent_of_a_bag(scenario, tmp_path):
 
 
 def test_a_long_bag_of_many_bodies_is_thinned(scenario, tmp_path, monkeypatch):
-    monkeypatch.setattr("push_view.playback._VALUES", 600)
+    monkeypatch.setattr("push_view.playback.VALUES", 600)
     data = playback_json(written(scenario, tmp_path / "a"))
     assert len(data["t"]) == 100 and data["t"][0] == 5.0 and data["t"][-1] == 15.0
 
