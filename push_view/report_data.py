@@ -137,7 +137,8 @@ def _shape(shape: Drawable) -> dict[str, Any]:
 def charts(contents: BagContents) -> list[dict[str, Any]]:
     """Errors of every object, then what methods and controllers report, by unit."""
     found = []
-    for axis, (title, unit) in enumerate((("position error", "mm"), ("orientation error", "rad"))):
+    titles = ("distance of the object from the goal", "angle of the object from the goal")
+    for axis, (title, unit) in enumerate(zip(titles, ("mm", "rad"), strict=True)):
         lines: list[Any] = []
         for job in contents.jobs.values():
             errors = errors_over_time(contents, job)

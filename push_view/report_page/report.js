@@ -71,8 +71,12 @@ const key = (colour, name) => {
   return made;
 };
 const known = new Map();
-const few = data.bodies.length <= 16;
-for (const body of data.bodies) known.set(few ? body.name : body.robot ? "robots" : "objects", body.colour);
+const colours = new Set(data.bodies.filter((body) => body.robot).map((body) => body.colour));
+const robots = data.bodies.filter((body) => body.robot).length;
+for (const body of data.bodies) {
+  const own = body.robot ? colours.size === robots : data.bodies.length - robots <= 8;
+  known.set(own ? body.name : body.robot ? "robots" : "objects", body.colour);
+}
 for (const moment of data.moments) for (const shape of moment.shapes) known.set(shape.layer, shape.colour);
 if (data.jobs.some((job) => job.goals.length)) known.set("goal", "var(--goal)");
 if (data.jobs.some((job) => job.plan.length)) known.set("plan", "var(--plan)");

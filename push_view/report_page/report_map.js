@@ -8,6 +8,7 @@ const dark = () => matchMedia("(prefers-color-scheme: dark)").matches;
 const shade = (colour) => {
   if (!dark() || !/^#[0-9a-f]{6}$/i.test(colour)) return colour;
   const parts = [1, 3, 5].map((k) => parseInt(colour.slice(k, k + 2), 16));
+  if (Math.min(...parts) > 150) return colour;
   return "#" + parts.map((v) => Math.round(v + 0.35 * (255 - v)).toString(16).padStart(2, "0")).join("");
 };
 

@@ -56,7 +56,7 @@ def test_data_of_a_report(scenario, tmp_path):
     x, y, _ = data["poses"][2]
     assert x[-1] == pytest.approx(1e4 * 0.99) and y[-1] == 0 and len(x) == len(data["times"])
     error, turned, *_ = data["charts"]
-    assert (error["title"], error["unit"]) == ("position error", "mm")
+    assert (error["title"], error["unit"]) == ("distance of the object from the goal", "mm")
     (line,) = error["lines"]
     assert line["v"][-1] == pytest.approx(0.0, abs=1e-6) and turned["unit"] == "rad"
     assert line["t"][0] == pytest.approx(2.0)  # there is no goal before
