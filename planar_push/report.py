@@ -4,6 +4,8 @@ import argparse
 import sys
 from pathlib import Path
 
+from push_model.settings import SettingsError
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this verb."""
@@ -13,15 +15,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="",
         help="folder; <bag>-report when it is not given, or the folder of the study",
     )
+    parser.add_argument(
+        "--attach", action="store_true", help="also put the report into the bag, as attachments"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Write them."""
-    from push_view.report import write_report
+    from push_record.attach import attach
+    from push_view.report import PRODUCTS, write_report
     from push_view.study_report import is_study, write_study_report
 
     bag = Path(arguments.bag)
     if is_study(bag):
+        if arguments.attach:
+            raise SettingsError("--attach: a study is no bag; give the bag of a trial")
         out = Path(arguments.out) if arguments.out else bag
         out.mkdir(parents=True, exist_ok=True)
         count = write_study_report(bag, out / "report.html")
@@ -33,6 +41,8 @@ def run(arguments: argparse.Namespace) -> int:
     except ValueError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
+    if arguments.attach:
+        attach(bag, [out / name for name in PRODUCTS if (out / name).is_file()])
     word = "final error" if errors["finished"] else "the recording ends in mid-job; error then"
     print(
         f"{out}: {word} {1e3 * errors['position_error_m']:.1f} mm, "

@@ -72,6 +72,10 @@ class BagWriter:
             self._file.flush()
             self._write_metadata()
 
+    def attach(self, name: str, media_type: str, data: bytes) -> None:
+        """Put a file into the bag."""
+        self._writer.add_attachment(0, self._last, name, media_type, data)
+
     @property
     def last(self) -> int:
         """[ns] greatest log time so far."""
@@ -204,6 +208,19 @@ class RawRecord:
     type: str
     stamp: int
     data: bytes
+
+
+def read_channels(bag: Path) -> list[tuple[str, str, bool]]:
+    """Name, type, and whether it is latched, of each topic, in the order of the file."""
+    schemas: dict[int, str] = {}
+    found: dict[str, tuple[str, str, bool]] = {}
+    for record in _records(bag):
+        if isinstance(record, Schema):
+            schemas[record.id] = record.name
+        elif isinstance(record, Channel):
+            latched = "transient_local" in record.metadata.get("offered_qos_profiles", "")
+            found.setdefault(record.topic, (record.topic, schemas[record.schema_id], latched))
+    return list(found.values())
 
 
 def read_bag(bag: Path, topics: set[str] | None = None) -> Iterator[Record]:

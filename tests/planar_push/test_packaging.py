@@ -92,7 +92,7 @@ def test_every_package_that_is_imported_is_a_dependency():
     of_pydantic = dict.fromkeys(("annotated_types", "pydantic_core"), "pydantic")
     names = {"yaml": "pyyaml", "PIL": "pillow", **of_pydantic}
     known = {requirement(line) for line in PROJECT["project"]["dependencies"]}
-    extra = {"distributed", "dask", "motioncapture", "shapely", "pytest", "hypothesis"}
+    extra = {"launch", "distributed", "dask", "motioncapture", "shapely", "pytest", "hypothesis"}
     ours = {name.split(".")[0] for name in PROJECT["tool"]["setuptools"]["packages"]}
     third = set()
     for package in ours - {"push_config", "benchmarks"}:

@@ -1,0 +1,10 @@
+"""``ros2 launch planar_push swarm.launch.py scenario:=…``: the nodes of the system ``swarm``."""
+
+from typing import Any
+
+from push_bringup.launch_description import describe
+
+
+def generate_launch_description() -> Any:
+    """As ROS calls it."""
+    return describe("swarm")
