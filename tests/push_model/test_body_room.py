@@ -115,6 +115,7 @@ def test_small_pillars_anywhere_inside_the_plate_are_seen():
         assert rooms_at_poses(body.among(field, NOTHING), pose[None])[0] == 0.0
 
 
+@pytest.mark.long
 def test_room_from_discs_and_outlines_that_are_not_on_the_map_is_exact():
     random = np.random.default_rng(4)
     field = DistanceField(rasterise(EnvironmentSpec((9.0, 9.0), resolution=0.05)))

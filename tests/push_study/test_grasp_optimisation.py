@@ -24,6 +24,7 @@ def slice_(tmp_path_factory):
     return out, task, study.trial(task)
 
 
+@pytest.mark.long
 def test_a_task_is_searched_as_well_as_by_a_grid_and_never_worse_than_by_the_local_method(slice_):
     _, task, row = slice_
     assert row["success"] and row["over_grid"] <= study.WORSE
@@ -36,6 +37,7 @@ def test_a_task_is_searched_as_well_as_by_a_grid_and_never_worse_than_by_the_loc
     assert placer.best().cost == row["cost"] < placer.cost(study.theta0(placer))
 
 
+@pytest.mark.long
 def test_optimised_places_hold_the_wrench_where_the_margin_says_so_and_nearly_elsewhere():
     means = []
     for name, trajectory in itertools.product(

@@ -121,9 +121,9 @@ def spoilt(run, how):
         ("moved", JobError.JOB_FORGOTTEN),
         ("reset", JobError.CLOCK_RESET),
         pytest.param("late reset", JobError.CLOCK_RESET, marks=pytest.mark.long),
-        ("died too often", JobError.JOB_FORGOTTEN),
+        pytest.param("died too often", JobError.JOB_FORGOTTEN, marks=pytest.mark.long),
         pytest.param("another team", JobError.NONE, marks=pytest.mark.long),
-        ("ended in good order", JobError.NONE),
+        pytest.param("ended in good order", JobError.NONE, marks=pytest.mark.long),
     ],
 )
 def test_a_job_of_another_world_is_not_taken_up(monkeypatch, how, code):

@@ -223,6 +223,7 @@ def compare(tmp_path, case, seeds, **changes):
     )
 
 
+@pytest.mark.long
 def test_the_constraint_takes_the_slip_of_the_bends_away(tmp_path, capsys):
     """Case II, with the noise, the latency and the frictions of ``mild``."""
     kept, ratio, _, rows = compare(tmp_path, 2, [4], pairs=2)
