@@ -63,12 +63,13 @@ class EPuck2Driver:
         self._out = b""
         self._reader = AnswerReader()
         self._unanswered = 0
+        self._answered = False
         self._sent = self._heard = -math.inf
 
     @property
     def trouble(self) -> str:
         """See RobotDriver."""
-        return "" if self._connected else self._why
+        return "" if self._connected and self._answered else self._why
 
     def steps(self, twist: Array) -> Array:
         """``(2,)`` motor speeds [steps/s], left and right, whole numbers within the limits; scaled
@@ -81,7 +82,7 @@ class EPuck2Driver:
 
     def command(self, twist: Array, now: float) -> None:
         """See RobotDriver."""
-        if not self._connected:
+        if self.trouble:
             return
         steps = self.steps(twist)
         if not steps.any() or self._unanswered < _UNANSWERED:
@@ -132,7 +133,7 @@ class EPuck2Driver:
             self._lose(f"no connection to {self._where}: {errno.errorcode.get(code, code)}", now)
             return
         self._forget()
-        self._connected, self._why = True, ""
+        self._connected = True
         self._heard = now
         self.connections += 1
         self._throttle.clear()
@@ -179,7 +180,7 @@ class EPuck2Driver:
                 answers = self._reader.feed(data)
                 self._unanswered = max(0, self._unanswered - answers)
                 if answers:
-                    self._heard = now
+                    self._heard, self._answered = now, True
         except BlockingIOError:
             return
         except OSError as error:

@@ -61,6 +61,7 @@ class StandIn:
     def __enter__(self):
         self.start_robots()
         self.start_capture()
+        self.ready()
         return self
 
     def __exit__(self, *_):
@@ -68,8 +69,13 @@ class StandIn:
 
     def start_robots(self, *words):
         names = [str(self.table), "--port", self.port, "--light", self.shines_to, *words]
-        self.robots_process = self._start("fake_robots.py", names)
+        self.robots_process = self._start("fake_robots.py", names, stdout=subprocess.PIPE)
+        self._stack.callback(self.robots_process.stdout.close)
         return self.robots_process
+
+    def ready(self):
+        """Wait until the robots are on their table: their program says so."""
+        assert b"robots from port" in self.robots_process.stdout.readline()
 
     def start_capture(self, *words):
         names = ["--bodies", json.dumps(self.markers), "--light", self.light]
@@ -77,10 +83,10 @@ class StandIn:
         self.capture_process = self._start("fake_motion_capture.py", names)
         return self.capture_process
 
-    def _start(self, file, words):
+    def _start(self, file, words, **options):
         line = [sys.executable, str(FOLDER / file), *map(str, words)]
         environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-        made = subprocess.Popen(line, env=environment, start_new_session=True)
+        made = subprocess.Popen(line, env=environment, start_new_session=True, **options)
         self._stack.callback(end, made)
         return made
 

@@ -76,8 +76,10 @@ def connected(peer, **words):
     made.poll(0.0)
     peer.accept()
     made.poll(0.01)
-    assert made.trouble == ""
+    assert made.trouble  # connected, but it has not answered yet
     peer.answer()
+    made.poll(0.015)
+    assert made.trouble == ""
     return made
 
 
@@ -173,6 +175,8 @@ def test_a_silent_robot_is_lost_and_found_again_standing(peer):
     made.poll(1.6)
     peer.accept()
     made.poll(1.61)
+    peer.answer()
+    made.poll(1.62)
     assert made.trouble == "" and made.connections == 2
     assert peer.heard()[0] == (0, 0)
     made.close(2.0)

@@ -33,7 +33,10 @@ def scenario(name):
     return replace(found, objects={OBJECT: body}).settings("bridge", world="planar")
 
 
-@pytest.mark.parametrize(("name", "doubt"), [pytest.param("env1-target1", "none", marks=pytest.mark.long), ("short", "mild")])
+@pytest.mark.parametrize(
+    ("name", "doubt"),
+    [pytest.param("env1-target1", "none", marks=pytest.mark.long), ("short", "mild")],
+)
 def test_a_study_runs_it_and_the_object_ends_at_its_goal(name, doubt):
     believed, doubts, delays = scenario(name), uncertainty(doubt), set()
 
