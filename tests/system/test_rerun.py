@@ -179,3 +179,20 @@ def test_a_live_bag_is_compared_by_distance(tmp_path, capsys):
     (box,) = [line.split() for line in told.splitlines() if line.startswith("  box ")]
     assert float(box[5]) < 5.0  # [mm] at the end: both have reached the goal
     assert "/PUSHING" in told
+
+
+def test_a_demo_in_lockstep_ends_with_a_report_and_can_be_repeated(tmp_path, capsys):
+    words = ["demo", "swarm", "--scenario", str(tmp_path / "small.yaml"), "--lockstep"]
+    (tmp_path / "small.yaml").write_text(scenario_of("swarm").text)
+    out = tmp_path / "out"
+    assert main([*words, "--seed", "7", "--out", str(out)]) == 0
+    metadata = read_metadata(out / "bag")
+    assert (metadata["seed"], metadata["pace"], metadata["system"]) == ("7", "lockstep", "swarm")
+    told = bag_scenario(out / "bag")[0]
+    assert told.parameters["bridge"]["seed"] == 7
+    assert (out / "report.html").stat().st_size > 10_000
+    assert main(["rerun", str(out / "bag")]) == 0
+    assert "equal to the bit" in capsys.readouterr().out
+    assert main([*words, "--factor", "2", "--out", str(out)]) == 2
+    assert "no pace" in capsys.readouterr().err
+    assert (out / "bag").is_dir()  # nothing was removed
