@@ -13,7 +13,7 @@ CORES = tests/push_model tests/push_scenario tests/push_estimation tests/push_pl
   tests/push_supervisor tests/push_bringup tests/planar_push tests/push_record \
   tests/grasp_opt tests/swarm_push
 
-.PHONY: install demo test test-long test-studies test-fast coverage lint clean
+.PHONY: pictures install demo test test-long test-studies test-fast coverage lint clean
 install: $(STAMP)
 
 $(VENV)/bin/python:
@@ -66,6 +66,10 @@ lint: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check -q .
 	$(BIN)/mypy
+
+# The pictures of README and docs that show one run each.
+pictures: $(STAMP)
+	$(BIN)/python -m tests.pictures
 
 clean:
 	rm -rf $(VENV) results build *.egg-info
