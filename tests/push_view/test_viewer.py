@@ -10,10 +10,11 @@ from std_msgs.msg import Bool, String
 
 from push_job.report import Figure, polyline
 from push_job.report import Report as Report_
-from push_msgs.msg import JobState, Report
+from push_msgs.msg import Belief, JobState, Report
+from push_msgs.srv import Displace, Kill
 from push_ros.conversions import grid_to_ros, path_to_ros, pose_stamped_to_ros
 from push_ros.process import Spinner
-from push_ros.qos import LATCHED, STATUS
+from push_ros.qos import BELIEF, LATCHED, STATUS
 from push_ros.report_conversions import report_to_ros
 from push_view.suite_watch import SILENCE
 from tests.push_view.page_client import Page, Suite
@@ -133,6 +134,58 @@ def test_a_goal_and_a_cancel_of_the_page_reach_ros(page):
     assert json.loads(data)["stamp"] == f"{goal.header.stamp.sec}.{goal.header.stamp.nanosec:09d}"
     assert page.ask("POST", "/cancel", "{}")[0] == 202
     assert page.until(lambda: page.suite.cancels["/"] == 1)
+
+
+def test_the_bodies_of_a_world_are_moved_and_killed_by_its_services(page):
+    """The page's requests reach the services of the bridge, and their answers come back."""
+    calls = []
+
+    def answer(request, response):
+        calls.append(request)
+        response.success, response.message = len(calls) < 3, "there is a wall"
+        return response
+
+    node = page.suite.node
+    assert page.ask("POST", "/kill", '{"robot": "epuck1"}')[0] == 409, "nobody answers yet"
+    node.create_service(Kill, "/bridge/kill", answer)
+    node.create_service(Displace, "/displace", answer)
+    assert page.until(lambda: {"kill", "displace"} <= set(page.node.suite()["offered"]))
+    assert page.ask("POST", "/kill", '{"robot": "epuck1"}')[0] == 202
+    place = '{"name": "box", "x": 0.5, "y": -0.25, "theta": 1.0}'
+    assert page.ask("POST", "/displace", place)[0] == 202
+    status, _, text = page.ask("POST", "/displace", place)
+    assert status == 409 and b"there is a wall" in text
+    assert calls[0].robot == "epuck1"
+    assert (calls[1].name, calls[1].x, calls[1].y, calls[1].theta) == ("box", 0.5, -0.25, 1.0)
+    for path, body in (
+        ("/kill", '{"robot": 3}'),
+        ("/displace", '{"name": "box", "x": 0.5, "y": "", "theta": 1}'),
+        ("/pause", '{"paused": 1}'),
+    ):
+        assert page.ask("POST", path, body)[0] == 400
+    assert page.ask("POST", "/start", '{"system": "single", "scenario": "short"}')[0] == 409
+    assert len(calls) == 3
+
+
+def test_what_is_believed_is_listed_with_intervals_and_sources(page):
+    beliefs = page.suite.node.create_publisher(Belief, "/belief", BELIEF)
+    assert page.until(lambda: beliefs.get_subscription_count() > 0)
+    message = Belief(
+        source="person", bodies=["box", ""], quantities=["contact_friction", "latency"]
+    )
+    message.values, message.lows, message.highs = [0.25, 0.03], [0.2, 0.02], [0.3, 0.04]
+    beliefs.publish(message)
+    seen = page.events(lambda s: any(r["source"] == "person" for r in s["belief"]["rows"])
+                       if "belief" in s else False)  # fmt: skip
+    rows = {(r["body"], r["quantity"]): r for r in seen["belief"]["rows"]}
+    friction = rows["box", "contact_friction"]
+    assert (friction["value"], friction["low"], friction["high"]) == (0.25, 0.2, 0.3)
+    assert rows["poses", "latency"]["value"] == 0.03 and rows["box", "mass"]["source"] == "scenario"
+    message.values = [float("nan"), 0.03]
+    beliefs.publish(message)
+    page.until(lambda: False, 0.3)
+    again = page.events(lambda s: "belief" in s)["belief"]["rows"]
+    assert again == seen["belief"]["rows"], "a belief that cannot be is refused"
 
 
 def test_each_team_has_its_state_and_gets_its_own_goals(teams):
