@@ -3,7 +3,7 @@ and how they move. It uses the drivers of the scenario, without the bridge."""
 
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -121,10 +121,12 @@ class Observer:
 
     # Robots
 
-    def connect(self) -> None:
-        """Begin links to all robots; they come about while it watches."""
+    def connect(self, robots: Collection[str] | None = None) -> None:
+        """Begin links to robots, to all by default; they come about while it watches."""
         lab: LabSettings = self.lab
         for robot, (spec, _) in self.scenario.robots.items():
+            if robots is not None and robot not in robots:
+                continue
             host, link = RobotHost(self._node, robot, spec, 50.0), lab.robots[robot]
             if isinstance(link, EPuck2Link):
                 link = replace(link, silence=min(link.silence, _SILENCE))

@@ -3,6 +3,7 @@
 import argparse
 import sys
 import time
+from pathlib import Path
 
 from planar_push.arguments import add_namespace
 from push_bringup.systems import check_namespace
@@ -16,12 +17,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this verb."""
     parser.add_argument(
         "values",
-        nargs="+",
+        nargs="*",
         metavar="BODY.QUANTITY=VALUE[:LOW:HIGH]",
         help=f"for example box.contact_friction=0.25:0.2:0.3, or latency=0.03; quantities: "
         f"{', '.join(QUANTITIES)}. The values replace all that the same source said before",
     )
-    parser.add_argument("--source", default="person", help="who says so; default: person")
+    parser.add_argument(
+        "--from", dest="file", default="", help="file of planar-push calibrate with further values"
+    )
+    parser.add_argument("--source", default="", help="who says so; default: person, or the file's")
     add_namespace(parser)
 
 
@@ -48,6 +52,7 @@ def parsed(text: str) -> tuple[tuple[str, str], Interval]:
 
 def run(arguments: argparse.Namespace) -> int:
     """0 when nodes have heard it."""
+    from push_estimation.calibration_file import read_values
     from push_msgs.msg import Belief as BeliefMessage
     from push_record.recorder import heard_scenario
     from push_ros.belief_feed import belief_of
@@ -57,8 +62,13 @@ def run(arguments: argparse.Namespace) -> int:
     from push_ros.report_conversions import belief_to_ros
 
     check_namespace(arguments.namespace)
+    source, values = "person", dict[tuple[str, str], Interval]()
     try:
-        values = dict(parsed(text) for text in arguments.values)
+        if arguments.file:
+            source, values = read_values(Path(arguments.file))
+        values |= dict(parsed(text) for text in arguments.values)
+        if not values:
+            raise BeliefError("no values are given; expected BODY.QUANTITY=VALUE, or --from FILE")
         base: Belief = belief_of(heard_scenario(arguments.namespace))
         base.updated(values)  # it can be
     except BeliefError as error:
@@ -70,7 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
         if not spinner.until(lambda: publisher.get_subscription_count() > 0, _PATIENCE):
             print(f"error: nobody listens on {topic}", file=sys.stderr)
             return 1
-        publisher.publish(belief_to_ros(arguments.source, values))
+        publisher.publish(belief_to_ros(arguments.source or source, values))
         end = time.monotonic() + _SETTLE
         spinner.until(lambda: time.monotonic() > end, 2.0 * _SETTLE)
     return 0

@@ -24,9 +24,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from push_scenario.scenario import load_scenario
-from sim_bridge.planar_world import PlanarWorld
+from sim_bridge.planar_world import PlanarSettings, PlanarWorld
 
-STEP = 0.005  # [s] of the physics
+STEP = 0.005  # [s] of this program
+PHYSICS = 0.001  # [s]
 LOOP = 0.010  # [s] of the firmware
 STEPS_PER_TURN = 1000.0
 MOST = 1100  # [steps/s]
@@ -130,7 +131,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     words = parser.parse_args()
     scenario = load_scenario(words.scenario)
-    world = PlanarWorld(scenario.environment, scenario.robots, scenario.objects)
+    bodies = (scenario.robots, scenario.objects)
+    world = PlanarWorld(scenario.environment, *bodies, PlanarSettings(time_step=PHYSICS))
     robots = []
     for i, (name, (spec, _)) in enumerate(scenario.robots.items()):
         drive = spec.differential
@@ -156,7 +158,7 @@ def main() -> None:
             if tick % round(LOOP / STEP) == 0:
                 robot.loop(now, words.lost, tuple(words.delay), luck)
             world.command(robot.name, *robot.twist(now))
-        world.step(1, contacts=False)
+        world.step(round(STEP / PHYSICS), contacts=False)
         poses = {n: [float(v) for v in p] for n, p in world.poses().items()}
         packet = {"time": time.time(), "poses": poses}
         light.sendto(json.dumps(packet).encode(), ("127.0.0.1", words.light))

@@ -131,6 +131,17 @@ def test_named_pose_array_is_read_by_its_fields(bench):
     assert {k: m.position[0] for k, m in seen.items()} == {"A": 0.1, "B": 0.2} and stamp == 12.5
 
 
+def test_named_pose_array_on_a_topic(bench):
+    """Where its package is installed."""
+    messages = pytest.importorskip("motion_capture_tracking_interfaces.msg")
+    make_pose_driver(bench.host, NamedPoseArraySource())
+    named = messages.NamedPose(name="A", pose=pose(0.4, 0))
+    message = stamped(messages.NamedPoseArray, poses=[named])
+    say(bench, messages.NamedPoseArray, "/mocap/poses", message, lambda: bool(bench.sink.frames))
+    ((seen, stamp),) = bench.sink.frames
+    assert seen["A"].position[0] == 0.4 and stamp == 12.5
+
+
 def test_named_pose_array_without_its_package(bench, monkeypatch):
     monkeypatch.setitem(sys.modules, "motion_capture_tracking_interfaces.msg", None)
     with pytest.raises(SettingsError, match="motion_capture_tracking_interfaces is needed"):
