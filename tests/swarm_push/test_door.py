@@ -67,6 +67,7 @@ def rehearse(goals, ticks):
     return np.array(spent), answered, answers
 
 
+@pytest.mark.live  # alone: others make its ticks longer
 @pytest.mark.parametrize("targets", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_no_tick_is_long_while_a_task_is_judged_in_a_large_room_with_walls(targets):
     """20 robots, 16 m; each tick by the shorter of its times in two equal runs."""

@@ -66,6 +66,7 @@ def rehearse(ticks, moved_at):
     return np.array(told), np.array(spent), job, waited, searched
 
 
+@pytest.mark.live  # alone: others make its ticks longer
 def test_no_tick_is_long_in_a_large_room_and_equal_runs_are_equal():
     """Each tick by the shorter of its times in two equal runs: the machine may be busy."""
     runs = [rehearse(250, 160) for _ in range(2)]

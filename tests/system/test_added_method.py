@@ -125,7 +125,7 @@ def test_its_node_brings_the_object_there_and_page_and_bag_show_it(tmp_path):
         state = run.reach(GOAL, 60.0)
         assert state is not None and state.error_code == 0 and state.refusals == 0
         assert state.system == "bulldozer"
-        rows = dict(page.rows())
+        rows = {r["name"]: r["text"] for r in page.rows()}
         assert rows["phase"] == "shove" and rows["still to go"].endswith("mm")
         assert {s["layer"] for s in page.shapes()} == {"beeline"}
         speed = np.diff(np.array(run.observer.trace.robot)[50:150, 0]).max() * 100.0

@@ -104,6 +104,7 @@ def ends(run, limit=120.0):
     return run.observer.state
 
 
+@pytest.mark.long
 def test_equal_seeds_give_equal_runs_to_the_bit_also_in_a_fresh_process(undisturbed):
     here = undisturbed
     assert here == run_once()

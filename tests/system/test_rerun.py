@@ -54,7 +54,9 @@ def no_context_is_left():
     assert not rclpy.ok()
 
 
-@pytest.mark.parametrize("system", ["single", "group", "swarm"])
+@pytest.mark.parametrize(
+    "system", [*(pytest.param(s, marks=pytest.mark.long) for s in ("single", "group")), "swarm"]
+)
 def test_a_run_of_each_system_is_repeated_to_the_bit(system, tmp_path):
     """With the noise, the latency and the other frictions of a trial, which are in the bag."""
     believed, world, drawn = uncertainty("mild").draw(scenario_of(system), 5)
