@@ -7,10 +7,12 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 from push_view.playback_server import PlaybackServer
 from tests.push_view.browser import CHROMIUM, Browser
+from tests.system.test_page_live import Page
 
 IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
 RUNS = (
@@ -24,8 +26,8 @@ RUNS = (
 """System, scenario, and the pictures that are made of its run."""
 
 PRODUCT = {".png": "trajectory.png", ".gif": "animation.gif"}
-PAGES = (("view.png", ("env1-target1",), 0.6), ("play.png", ("env1-target1", "group-ellipse"), 0.6))
-"""Picture of the page, the runs that it shows, and the fraction of the time at which it does."""
+PAGES = (("play.png", ("env1-target1", "group-ellipse"), 0.6),)
+"""Picture of a playback, the runs that it shows, and the fraction of the time at which it does."""
 
 
 def main(images: Path = IMAGES) -> int:
@@ -52,7 +54,22 @@ def main(images: Path = IMAGES) -> int:
                 shoot(bags, images / name, fraction)
             else:
                 failed += 1
+        shoot_live(images / "view.png", Path(folder))
     return int(failed > 0)
+
+
+def shoot_live(picture: Path, folder: Path) -> None:
+    """The live view in the middle of a push."""
+    page = Page(folder, 1280, 860, touch=False)
+    try:
+        page.start("single", "env1-target1")
+        page.fill(x="1.3", y="0.75", theta="0.0")
+        page.value("document.querySelector('#typed button[value=go]').click()")
+        page.until("document.getElementById('state').textContent === 'PUSHING'", 60.0)
+        time.sleep(12.0)
+        page.browser.picture(picture)
+    finally:
+        page.close()
 
 
 def shoot(bags: list[Path], picture: Path, fraction: float) -> None:
