@@ -14,6 +14,7 @@ from rclpy.node import Node
 from std_msgs.msg import Bool, String
 from std_srvs.srv import SetBool
 
+from lab_bridge.crowding import Crowding
 from lab_bridge.fleet import Fleet
 from lab_bridge.guard import Guard
 from lab_bridge.lab_clock import LabClock
@@ -88,6 +89,7 @@ class LabBridgeNode(Node):
             Clocks(time.monotonic, self._system_time),
             self._on_frame,
             self._diagnostics.refuse,
+            Crowding(self.scenario).impossible,
         )
         hosts = {
             r: RobotHost(self, r, s, self.settings.command_rate) for r, s in self._specs.items()

@@ -59,9 +59,11 @@ class PoseIntake:
         clocks: Clocks,
         publish: Callable[[float, Mapping[str, Array], Stamp], None],
         complain: Callable[[str, str], None],
+        impossible: Callable[[Mapping[str, Array]], str] = lambda poses: "",
     ) -> None:
         """publish: called with the stamp [s], the poses ``(3,)`` by body, and the verdict on the
-        stamp. complain: called with what is refused and why."""
+        stamp. complain: called with what is refused and why. impossible: why the poses of a frame
+        cannot be, empty where they can."""
         self.mapping = MarkerMapping(lab, bodies)
         self.gate = PoseGate(gate, bodies)
         self._assembler: FrameAssembler[Marker] = FrameAssembler(
@@ -69,7 +71,7 @@ class PoseIntake:
         )
         self._by_capture = lab.stamps == "capture"
         self._tilt, self._clocks = settings.max_tilt, clocks
-        self._publish, self._complain = publish, complain
+        self._publish, self._complain, self._impossible = publish, complain, impossible
         self.figures = Figures()
         self.unknown: set[str] = set()
         """Names in motion capture that belong to no body."""
@@ -127,6 +129,10 @@ class PoseIntake:
             placed = self.mapping.place(body, seen)
             if self._plausible(body, placed) and self.gate.accept(body, placed.pose):  # type: ignore[union-attr]
                 poses[body] = placed.pose  # type: ignore[union-attr]
+        why = self._impossible(poses)
+        if why:
+            self._complain("frame", f"{why}; see lab.units and lab.origin")
+            return
         self._publish(frame.stamp, poses, verdict)
 
     def _plausible(self, body: str, placed: Placed | None) -> bool:

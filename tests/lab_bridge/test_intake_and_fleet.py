@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from lab_bridge.crowding import Crowding
 from lab_bridge.fleet import Fleet
 from lab_bridge.marker_mapping import Marker
 from lab_bridge.pose_intake import Clocks, PoseIntake
@@ -13,6 +14,7 @@ from lab_bridge.settings import LabBridgeSettings
 from push_estimation.pose_gate import PoseGateSettings, Stamp
 from push_scenario.bodies import load_robot
 from push_scenario.lab import LabBody, LabSettings, PoseStampedSource, TwistLink
+from push_scenario.scenario import load_scenario
 
 UP = [0.0, 0.0, 0.0, 1.0]
 
@@ -178,3 +180,37 @@ def test_lost_and_found_robots_are_told_once(team):
     team.fleet.close(lambda seconds: None)
     assert team.e.told[-1] == [0.0, 0.0, 0.0]
     assert team.e.closed and team.d.closed
+
+
+@pytest.mark.parametrize(
+    ("poses", "words"),
+    [
+        ({"epuck1": (-0.7, 0.0), "box": (-0.45, 0.0)}, ""),
+        ({"epuck1": (-0.54, 0.0), "box": (-0.45, 0.0)}, ""),  # in contact
+        ({"epuck1": (-7e-4, 0.0), "box": (-4.5e-4, 0.0)}, "epuck1 is inside box"),
+        ({"epuck1": (-700.0, 0.0), "box": (-450.0, 0.0)}, "off the map"),
+        ({}, ""),
+    ],
+)
+def test_frames_that_cannot_be(poses, words):
+    """Among them a lab in metres that is read as millimetres, and the other way round."""
+    check = Crowding(load_scenario("short"))
+    found = check.impossible({n: np.array([*xy, 0.3]) for n, xy in poses.items()})
+    assert words in found and bool(found) == bool(words)
+
+
+def test_robots_in_one_place():
+    check = Crowding(load_scenario("group-ellipse"))
+    poses = {f"epuck{i}": np.array([0.1 * i, 0.0, 0.0]) for i in (1, 2)}
+    assert check.impossible(poses) == ""
+    poses["epuck2"] = poses["epuck1"] + 0.01
+    assert check.impossible(poses) == "epuck1 and epuck2 are in one place"
+
+
+def test_a_frame_that_cannot_be_is_refused_as_a_whole():
+    bench = Bench()
+    bench.intake._impossible = lambda poses: "two in one place" if len(poses) > 1 else ""
+    bench.say(7.0, Robot=0.1, Box=0.1)
+    bench.say(7.01, Robot=0.1)
+    assert [set(f[1]) for f in bench.frames] == [{"r"}]
+    assert "two in one place; see lab.units" in bench.complaints[0]

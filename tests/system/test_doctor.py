@@ -6,6 +6,7 @@ import time
 
 import pytest
 
+from push_bringup.suite import Suite
 from tests.lab_bridge.stand_in import StandIn
 
 pytestmark = [pytest.mark.live, pytest.mark.long]
@@ -83,3 +84,15 @@ def test_a_good_lab_is_called_good(domain, tmp_path):
         lab.__exit__()
     assert exit_code == 0 and "fact: DRIVES: epuck1 drives and turns as commanded" in text
     assert "0 errors" in text
+
+
+def test_beside_a_suite_the_bridge_says_how_the_robots_are(domain, tmp_path):
+    with StandIn("lab-single.yaml", tmp_path) as lab, Suite(str(lab.scenario)) as suite:
+        exit_code, text = doctor(lab)
+        assert exit_code == 0 and "fact: CONNECTED: epuck1 answers" in text
+        assert suite.monitor().pose is not None
+        lab.robots_process.kill()
+        suite.monitor().wait(2.5, lambda: False)
+        exit_code, text = doctor(lab)
+        assert exit_code == 1 and "error: ROBOT_SILENT: epuck1: " in text
+        assert "warning: PAUSED" in text
