@@ -128,7 +128,7 @@ def figure_text(figure: Figure) -> str:
     if not math.isfinite(v):
         return "–"
     if unit == "m" and abs(v) < 1.0:
-        return f"{1e3 * v:.1f} mm"
+        return f"{round(1e3 * v, 1) + 0.0:.1f} mm"  # no minus before a zero
     if unit == "s" and 0.0 < abs(v) < 1e-3:
         return f"{1e6 * v:.0f} µs"
     if unit == "s" and 0.0 < abs(v) < 1.0:
