@@ -9,12 +9,21 @@ it the world is live, as it is in the lab.
 
 import time
 from collections.abc import Callable
+from weakref import WeakKeyDictionary
 
 from rclpy.node import Node
 from std_msgs.msg import Bool
 
 from push_ros.names import Names
 from push_ros.qos import LATCHED
+
+_clocks: "WeakKeyDictionary[Node, LivenessClock]" = WeakKeyDictionary()
+
+
+def pace_known(node: Node) -> bool:
+    """Whether the bridge has told a node how the world is paced; true for one that does not ask."""
+    clock = _clocks.get(node)
+    return clock is None or clock.told
 
 
 class LivenessClock:
@@ -30,6 +39,9 @@ class LivenessClock:
         """Whether the world stands still."""
         self.lockstep = False
         """Whether the world waits for its controllers."""
+        self.told = False
+        """Whether the bridge has said so."""
+        _clocks[node] = self
         self._stamp = stamp
         self._now = 0.0
         self._wall, self._pose_time = time.monotonic(), stamp()
@@ -53,4 +65,4 @@ class LivenessClock:
 
     def _on_lockstep(self, message: Bool) -> None:
         _ = self.now
-        self.lockstep = bool(message.data)
+        self.lockstep, self.told = bool(message.data), True

@@ -26,6 +26,7 @@ from push_msgs.msg import JobState
 from push_record.recorder import RecorderNode
 from push_ros.claims import claim_domain
 from push_ros.names import Names, space
+from push_ros.pace_feed import pace_known
 from push_ros.process import Spinner, prepare_environment
 from push_scenario.scenario import Scenario
 from push_study.discovery import Discovery, NotDiscovered
@@ -150,6 +151,7 @@ class LockstepRun:
         owned = [len(s.robots) for s in specs if s.traits.commands]
         self._commanded = kinds.count("supervisor") + sum(owned)
         self._listeners = sum(s.traits.listens for s in specs)
+        self.nodes = tuple(nodes)
         self.spinner = Spinner(nodes)
 
     def __enter__(self) -> "LockstepRun":
@@ -188,6 +190,7 @@ class LockstepRun:
                 self._recorded(),
                 len(self.bridge.commanded()) >= self._commanded,
                 bool(self.bridge.heard_by(self._listeners)),
+                all(pace_known(node) for node in self.nodes),
             )
 
         discovery = Discovery(self.observer, self.spinner)

@@ -18,6 +18,7 @@ from visualization_msgs.msg import MarkerArray
 
 from push_msgs.action import MoveObject
 from push_msgs.msg import JobState
+from push_ros import pace_feed
 from push_ros.conversions import pose_stamped_to_ros
 from push_ros.qos import COMMAND, LATCHED
 from push_scenario.scenario import load_scenario
@@ -251,6 +252,15 @@ def test_stopped_stream_stops_the_robot_and_its_return_lets_it_go_on(short, monk
     assert short.bridge.unanswered == 0
     assert ends(short).error_code == 0
     assert final_errors(short.observer.trace, short.scenario.goal)[0] < 0.02
+
+
+def test_all_nodes_know_that_the_world_waits_before_it_moves():
+    """A node that hears so late takes the world for live, and its limits for wall time."""
+    with LockstepRun(load_scenario("short"), quiet=True) as run:
+        feeds = [c for n in run.nodes if (c := pace_feed._clocks.get(n)) is not None]
+        assert len(feeds) >= 2 and not all(c.told for c in feeds)
+        run.connect()
+        assert all(c.told and c.lockstep for c in feeds)
 
 
 def test_a_wall_clock_that_leaps_changes_nothing(monkeypatch, undisturbed):
