@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from push_scenario.scenario import Scenario
 
 PARTS = ("all", "mocap", "robots")
+_DISCOVERY = 1.2  # [s] wall time for other programs to be discovered
+_GRAPH = 3.2  # [s] wall time until all of them must have said how they are; nodes do once a second
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -84,7 +86,7 @@ def examine(arguments: argparse.Namespace) -> "Iterator[Finding]":
 
 def _graph(
     arguments: argparse.Namespace, node: Any, spinner: Any
-) -> "tuple[list[Finding], Scenario | None, dict[str, str]]":
+) -> "tuple[list[Finding], Scenario | None, dict[str, str] | None]":
     """Findings about the graph, the scenario, and what a running lab bridge says of its robots."""
     from diagnostic_msgs.msg import DiagnosticArray
     from std_msgs.msg import Bool, String
@@ -108,8 +110,20 @@ def _graph(
     node.create_subscription(DiagnosticArray, f"{here}diagnostics", on_states, STATUS)
     node.create_subscription(String, f"{here}scenario", lambda m: texts.append(m.data), LATCHED)
     node.create_subscription(Bool, f"{here}paused", lambda m: paused.append(m.data), LATCHED)
-    end = time.monotonic() + 1.2
-    spinner.until(lambda: time.monotonic() > end, 3.0)
+    earliest = time.monotonic() + _DISCOVERY
+
+    def complete() -> bool:
+        """Whether everybody who was discovered has been heard."""
+        infos = node.get_publishers_info_by_topic(f"{here}diagnostics")
+        nodes = {f"{i.node_namespace}/{i.node_name}".strip("/") for i in infos}
+        return (
+            time.monotonic() > earliest
+            and nodes <= states.keys()
+            and (bool(paused) or not publishers(node, f"{here}paused"))
+            and (bool(texts) or not publishers(node, f"{here}scenario"))
+        )
+
+    spinner.until(complete, _GRAPH)
     found = [fact("DOMAIN", f"ROS_DOMAIN_ID {domain}, discovery {discovery}")]
     sources = publishers(node, f"{here}poses", "push_msgs/msg/Poses")
     if sources > 1:
@@ -124,10 +138,12 @@ def _graph(
                 "PAUSED", "the suite is paused", "call /bridge/pause with data: false, or see below"
             )
         )
-    runs: dict[str, str] = {}
+    runs: dict[str, str] | None = {} if sources else None
     for name, status in states.items():
         values = {v.key: v.value for v in status.values}
-        runs |= {k.removeprefix("robot "): v for k, v in values.items() if k.startswith("robot ")}
+        robots = {k: v for k, v in values.items() if k.startswith("robot ")}
+        if robots:
+            runs = (runs or {}) | {k.removeprefix("robot "): v for k, v in robots.items()}
         level = status.level if isinstance(status.level, int) else status.level[0]
         if level > 0 and arguments.part == "all":
             found.append(warning("NODE", f"{name}: {status.message}", ""))
@@ -138,18 +154,18 @@ def _graph(
 
 
 def _lab(
-    arguments: argparse.Namespace, observer: "Observer", runs: dict[str, str]
+    arguments: argparse.Namespace, observer: "Observer", runs: dict[str, str] | None
 ) -> "Iterator[Finding]":
-    """runs: what a running bridge says of its robots; empty where there is none."""
+    """runs: what a running bridge says of its robots; None where there is none."""
     import numpy as np
 
     from lab_bridge.capture_diagnosis import Room, diagnose_capture
-    from lab_bridge.findings import Weight
+    from lab_bridge.findings import Weight, warning
     from lab_bridge.robot_diagnosis import RobotFacts, diagnose_robots
 
-    if runs and arguments.drive:
+    if runs is not None and arguments.drive:
         raise SettingsError("a suite is running; stop it before robots are driven")
-    if not runs and arguments.part != "mocap":  # a robot has one client
+    if runs is None and arguments.part != "mocap":  # a robot has one client
         observer.connect()
     observer.watch(arguments.seconds)
     grid = observer.scenario.grid
@@ -162,7 +178,11 @@ def _lab(
         yield from seen
     if arguments.part == "mocap":
         return
-    if runs:
+    if runs == {}:
+        text = "a bridge publishes poses, but does not say how its robots are"
+        yield warning("BRIDGE_SILENT", text, "it may be frozen, or no lab bridge: start it again")
+        return
+    if runs is not None:
         troubles = {r: "" if v == "connected" else v for r, v in runs.items()}
         yield from diagnose_robots(RobotFacts(troubles))
         return

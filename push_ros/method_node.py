@@ -54,6 +54,7 @@ PATIENCE = 10.0  # [s] without poses of the object after which a task ends
 _SILENCE = 0.3  # [s] without a frame after which goals are judged without
 _REPORTS = 0.05  # [s] of pose time between reports
 _WAITING = Status(int(JobPhase.IDLE), "IDLE", "waiting for a map")
+_EARLY = Status(int(JobPhase.PLANNING), "PLANNING", "waiting for a map")
 
 
 class MethodNode(Node):
@@ -96,6 +97,9 @@ class MethodNode(Node):
         self.settings, gate = declare_method(self, chosen, name, scenario)
         self.method: Method | None = None
         self._why_not = "there is no map yet"
+        self._early: Task | None = None  # taken before there was a map; begins when it is there
+        self._early_since = 0.0  # [s] on the clock for silence
+        self._early_end: Status | None = None  # how it ended, where it never began
         self._grid: Grid | None = None
         self._seen: Seen | None = None
         self._missing = 0.0  # [s] of pose time without the object
@@ -158,6 +162,10 @@ class MethodNode(Node):
     @property
     def status(self) -> Status:
         """How the task stands."""
+        if self._early is not None:
+            return _EARLY
+        if self._early_end is not None:
+            return self._early_end
         return self.method.status if self.method is not None else _WAITING
 
     @property
@@ -201,7 +209,9 @@ class MethodNode(Node):
         """See JobOwner."""
         if code is JobError.CANCELED:
             self._door.drop(code, message)
-        if self.method is not None:
+        if self._early is not None:
+            self._end_early(code, message)
+        elif self.method is not None:
             self.method.end(code, message)
         self._look_after_task()
 
@@ -235,21 +245,42 @@ class MethodNode(Node):
         """See TaskHost."""
         self._waiting, self._missing = self._poses.clock.now, 0.0
         self._intake.keep(task)
+        self._early_end = None
         if self.method is not None:
             self.method.begin(task, self.beliefs.current)
+        else:
+            self._early, self._early_since = task, self._poses.clock.now
+        self._look_after_task()
+
+    def _end_early(self, code: JobError, message: str) -> None:
+        self._early = None
+        self._early_end = Status(int(JobPhase.IDLE), "IDLE", message, int(code))
+
+    def _begin_early(self, refusal: GoalRefused | None) -> None:
+        """A task that came before the map has been judged on the map."""
+        task, self._early = self._early, None
+        if task is None:
+            return
+        if refusal is None:
+            self.take_task(task)
+        else:
+            self._end_early(refusal.code, str(refusal))
         self._look_after_task()
 
     # The world
 
     def _take_map(self, grid: Grid) -> None:
-        self._door.drop(JobError.PREEMPTED, "the map has changed")
-        self.end_job(JobError.PREEMPTED, "the map has changed")
+        if self._grid is not None:
+            self._door.drop(JobError.PREEMPTED, "the map has changed")
+            self.end_job(JobError.PREEMPTED, "the map has changed")
         self._grid = grid
         arena = Arena(grid, self.robot_specs, self.object, self.item, self.settings, self.partners)
         try:
             self.method = self.spec.make(arena)
         except Unsuited as error:
             self.method, self._why_not = None, str(error)
+        if self._early is not None:
+            self._door.ask(self._early, self._begin_early)
         self._look_after_task()
 
     def _on_frame(self, frame: Frame) -> None:
@@ -289,7 +320,7 @@ class MethodNode(Node):
         others = self._poses.discs(self._roster.obstacles)
         ages = self._poses.ages((self.object, *robots), frame)
         self._seen = seen = Seen(self._poses.stamp, item, robots, others, ages=ages)
-        if method is None or not self.busy:
+        if method is None or self._early is not None or not self.busy:
             return Told()
         began = time.thread_time()
         told = method.step(seen, self.beliefs.current)
@@ -316,6 +347,9 @@ class MethodNode(Node):
             self._door.go_on()
         if not self.busy:
             self._waiting = now
+        elif self._grid is None and now - self._early_since > PATIENCE:
+            topic = self.names.world("map")
+            self.end_job(JobError.PLANNING_FAILED, f"no map has been received on {topic}")
         elif now - self._waiting > PATIENCE and self._poses.silence > PATIENCE:
             self.end_job(JobError.POSES_STALE, "no poses arrive")
 
@@ -370,7 +404,7 @@ class MethodNode(Node):
             self._intake.finish(MoveObject.Result(**done, **common))
 
     def _errors(self) -> tuple[float, float]:
-        if self.method is None or self._seen is None:
+        if self.method is None or self._seen is None or self._early is not None:
             return math.inf, math.inf
         return self.method.errors(self._seen)
 

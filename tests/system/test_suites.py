@@ -107,7 +107,7 @@ def test_what_a_dead_node_said_is_quoted(domain, monkeypatch):
 @pytest.mark.long
 def test_two_teams_side_by_side_in_one_world(domain, tmp_path):
     """Done-when 3: two single-robot systems in one graph, neither touches the other."""
-    with Suite("two-singles", record=tmp_path / "bag", namespace="a", factor=2.0) as suite:
+    with Suite("two-singles", record=tmp_path / "bag", namespace="a") as suite:
         results = suite.reach_all()
     assert set(results) == {"south", "north"}
     for result in results.values():
