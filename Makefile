@@ -13,7 +13,7 @@ CORES = tests/push_model tests/push_scenario tests/push_estimation tests/push_pl
   tests/push_supervisor tests/push_bringup tests/planar_push tests/push_record \
   tests/grasp_opt tests/swarm_push
 
-.PHONY: pictures install demo test test-long test-studies test-fast coverage lint clean
+.PHONY: docs pictures install demo test test-long test-studies test-fast coverage lint clean
 install: $(STAMP)
 
 $(VENV)/bin/python:
@@ -66,6 +66,11 @@ lint: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check -q .
 	$(BIN)/mypy
+
+# The pages of docs as a site, with an API reference; needs no network.
+docs: $(STAMP)
+	$(BIN)/python -m sphinx -q -W -b html docs build/docs
+	@echo "build/docs/index.html"
 
 # The pictures of README and docs that show one run each.
 pictures: $(STAMP)

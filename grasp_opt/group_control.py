@@ -244,7 +244,7 @@ class GroupController:
         wrench = (
             np.array([s.position_gain, s.position_gain, s.orientation_gain]) * off
             + np.array([s.velocity_gain, s.velocity_gain, s.turning_gain]) * change
-            + self.surface.wrench(task)  # (3.21), zero at rest, where it is 0/0
+            + self.surface.wrench(task)  # (3.21); zero at rest, where the printed one is 0/0
         )
         local = se2.transform(se2.inverse(pose), robots)
         way, away = self.outline.nearest(local)

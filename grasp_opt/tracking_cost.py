@@ -4,6 +4,7 @@ With the contacts given, the problem in the forces is a linear-quadratic one wit
 
     min  sum_k 1/2 e_k' Q e_k + 1/2 u_k' R u_k,   e_(k+1) = e_k + B_k u_k - d_k,   u_k >= 0,
 
+The motion of the object under contact forces is (3.13), of which each step is one of (3.17).
 e being the error of the object's pose, u the lambdas of all friction cones' edges, d the task's
 steps. An interior-point method makes a linear-quadratic regulator of each of its iterations: with
 D = (R + z/u)^-1 and S = B D B' everything but u is three-dimensional, and a step of the horizon

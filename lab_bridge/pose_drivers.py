@@ -13,6 +13,7 @@ import numpy as np
 from rclpy.node import Node
 
 from lab_bridge.marker_mapping import Marker
+from push_model.outside import from_outside
 from push_model.settings import SettingsError
 from push_scenario.lab import OtherSource
 
@@ -92,26 +93,10 @@ def make_pose_driver(host: PoseHost, source: Any) -> PoseDriver:
     SettingsError: it cannot be found, or it refuses its settings.
     """
     if isinstance(source, OtherSource):
-        maker: PoseDriverMaker = driver_outside(source.driver, "lab.poses.driver")
+        maker: PoseDriverMaker = from_outside(source.driver, "lab.poses.driver")
         return maker(host, source.settings)
     maker = importlib.import_module(f"lab_bridge.poses_{source.kind}").DRIVER
     return maker(host, source)
-
-
-def driver_outside(name: str, where: str) -> Any:
-    """What ``MODULE:ATTRIBUTE`` names.
-
-    Raises
-    ------
-    SettingsError: there is no such thing.
-    """
-    module, colon, attribute = name.partition(":")
-    if not colon:
-        raise SettingsError(f"{where}: expected MODULE:ATTRIBUTE, got '{name}'")
-    try:
-        return getattr(importlib.import_module(module), attribute)
-    except (ImportError, AttributeError) as error:
-        raise SettingsError(f"{where}: '{name}': {error}") from None
 
 
 def marker_from_ros(position: Any, orientation: Any) -> Marker:

@@ -11,8 +11,8 @@ from typing import Any, Protocol
 
 from rclpy.node import Node
 
-from lab_bridge.pose_drivers import driver_outside
 from push_model.arrays import Array
+from push_model.outside import from_outside
 from push_model.specs import RobotSpec
 from push_scenario.lab import OtherLink
 
@@ -64,7 +64,7 @@ def make_robot_driver(host: RobotHost, link: Any) -> RobotDriver:
     """
     if isinstance(link, OtherLink):
         where = f"lab.robots.{host.robot}.driver"
-        maker: RobotDriverMaker = driver_outside(link.driver, where)
+        maker: RobotDriverMaker = from_outside(link.driver, where)
         return maker(host, link.settings)
     maker = importlib.import_module(f"lab_bridge.robots_{link.kind}").DRIVER
     return maker(host, link)

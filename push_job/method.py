@@ -12,7 +12,6 @@ notebook calls the method itself::
         world.step(told.commands)
 """
 
-import importlib
 import math
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
@@ -26,6 +25,7 @@ from push_model.arrays import Array
 from push_model.belief import Belief
 from push_model.jobs import JobError
 from push_model.occupancy import OccupancyGrid
+from push_model.outside import from_outside
 from push_model.settings import SettingsError, from_mapping
 from push_model.specs import ObjectSpec, RobotSpec
 
@@ -243,11 +243,7 @@ def method_spec(name: str) -> MethodSpec | None:
     SettingsError: the module cannot be imported, or the attribute is no method.
     """
     if ":" in name:
-        module, _, attribute = name.partition(":")
-        try:
-            found = getattr(importlib.import_module(module), attribute)
-        except (ImportError, AttributeError) as error:
-            raise SettingsError(f"method '{name}': {error}") from None
+        found = from_outside(name, "method")
     else:
         entry = next((e for e in entry_points(group=ENTRY_POINTS) if e.name == name), None)
         if entry is None:

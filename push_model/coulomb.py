@@ -15,7 +15,8 @@ def cone_angle(friction: float) -> float:
 
 
 def cone_edges(normal: Array, friction: float) -> Array:
-    """Unit directions ``(2, 2)`` of the cone's right and left edges (rows), seen along the normal.
+    """Unit directions ``(2, 2)`` of the cone's right and left edges (rows), seen along the normal,
+    (3.14). Forces in the cone are their sums with coefficients that are not negative, (3.15).
 
     Parameters
     ----------

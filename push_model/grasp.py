@@ -1,4 +1,4 @@
-"""Grasp matrices: from contact forces to the wrench on the object, (2.40)-(2.41), (3.1)."""
+"""Grasp matrices: from contact forces to the wrench on the object, (2.40)-(2.41), (3.1), (3.12)."""
 
 import math
 
@@ -9,7 +9,7 @@ from push_model.coulomb import cone_edges
 
 
 def grasp_matrix(points: Array, centre: Array | None = None) -> Array:
-    """G of (3.1): stacked planar contact forces to the wrench about the centre of mass.
+    """G of (3.1) and (3.12): stacked planar contact forces to the wrench about the centre of mass.
 
     Parameters
     ----------

@@ -53,7 +53,8 @@ class DifferentialDrive:
 
     def follow(self, velocities: Array, headings: Array, lead: float) -> Array:
         """Input/output linearisation: twists ``(n, 2)`` v [m/s], omega [rad/s] such that points
-        ahead of the robots' axles move at given velocities; scaled to the limits of the wheels.
+        ahead of the robots' axles move at given velocities, as (3.11) and chapter 4 take for
+        granted; scaled to the limits of the wheels.
 
         Parameters
         ----------

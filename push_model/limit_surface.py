@@ -58,7 +58,7 @@ class EllipsoidLimitSurface:
         return np.diag([self.max_force**2.0, self.max_force**2.0, self.max_torque**2.0])
 
     def wrench(self, twist: Array) -> Array:
-        """(3.4)."""
+        """(3.4), (3.21): wrench ``(3,)`` that keeps up a twist ``(3,)`` against the floor."""
         twist = _direction(twist)
         weighted: Array = self.twist_metric @ twist
         power = float(twist @ weighted)

@@ -152,6 +152,8 @@ class TorqueRobot:
     ) -> Array:
         """``(2,)`` [N]: mu N less the traction of the right and the left wheel, (2.31)-(2.32).
 
+        That is the friction cone (2.20)-(2.21) of the contact of a wheel, as (2.22) asks for.
+
         share: of the sideways traction of both that either is taken to bear. How they divide it is
         not known: (2.29)-(2.30) take all of it for each, which no division exceeds; with a half
         it is borne evenly.

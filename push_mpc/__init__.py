@@ -1,4 +1,4 @@
-"""Predictive controllers for pushing and for free motion, and the tracker around them (2.4)."""
+"""Predictive controllers for pushing and for free motion, and the tracker around them; 2.4."""
 
 from push_mpc.contact_force_mpc import ContactForceMpc
 from push_mpc.controller import Contact, MpcResult, PredictiveController, Reference

@@ -1,5 +1,7 @@
 """LTV-MPC of sections 2.4.5-2.4.6: contact forces are unknowns, and (2.53) ties them to the motion.
 
+The unknowns are those of (2.51): accelerations and contact forces of each step.
+
 In the robot frame the object that moves with the robot has the twist
 
     (v - omega y_or, omega x_or, omega) = H G f_c,    f_c >= 0,

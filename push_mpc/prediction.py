@@ -1,4 +1,5 @@
-"""Prediction of the tracking error, (2.35)-(2.49), and its condensed quadratic programme, (2.50).
+"""Prediction of the tracking error, (2.35)-(2.38) and (2.43)-(2.49), and its condensed programme,
+the quadratic one of (2.50).
 
 The error e = (e_x, e_y, e_theta, e_v, e_omega) is the robot's state in the reference frame, (2.37).
 Its dynamics (2.38) are integrated along the previous solution; the deviation from that roll-out is
@@ -235,7 +236,8 @@ def constant_rows(
     """The constant parts of the rows: normal ``(p, 7, r)``, bound ``(p, r)``, family ``(r,)``.
 
     Wheel speeds (2.50c), changes of the input (2.50b) no greater than change ``(2,)``, curvature
-    (2.57), obstacles (2.61). Bounds and normals that depend on the tick are left to ``tick_rows``.
+    (2.55)-(2.57), obstacles (2.58)-(2.62). Bounds and normals that depend on the tick are left to
+    ``tick_rows``.
     family: index of the slack of the row, -1 for none.
     """
     first = WHEELS + CHANGES + CURVATURES
@@ -269,6 +271,9 @@ def tick_rows(
     bound: Any,
 ) -> None:
     """Rows of this tick, into normal and bound of ``constant_rows``.
+
+    Curvature: low v <= omega <= high v, (2.55)-(2.56). Obstacles: the half-plane of (2.60) through
+    the nearest point (2.59) of each circle, so that its distance (2.58) is kept.
 
     In a push, v >= 0 replaces the backward wheel limits. Unused rows get the bound inf.
 

@@ -11,8 +11,8 @@ class ControllerSettings:
 
     controller: str = bounded(
         "ltv",
-        doc="Name of the predictive controller: 'ltv' (curvature constraint) or "
-        "'contact_force' (contact forces)",
+        doc="Name of the predictive controller: 'ltv' (curvature constraint), "
+        "'contact_force' (contact forces), or MODULE:ATTRIBUTE of another one",
     )
 
 

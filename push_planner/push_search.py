@@ -269,7 +269,12 @@ class PushSearch:
     cost: float = math.inf
 
     def run(self, statistics: SearchStatistics) -> Iterator[None]:
-        """Search (Algorithm 1). Yields after each slice, and adds its work to the statistics."""
+        """Search (Algorithm 1). Yields after each slice, and adds its work to the statistics.
+
+        The order of the queue is (2.9): the cost of a node, (2.10), and an estimate of the rest.
+        The thesis estimates the rest by the length of the guide path, (2.11); here ``rough_costs``
+        gives it, which is nearer to the truth.
+        """
         graph = self.graph
         ready, estimate = graph.rough_costs(self.bound)
         yield

@@ -31,12 +31,12 @@ from push_model.arrays import Array
 from push_model.drives import HolonomicDrive
 from push_model.jobs import GoalRefused, JobError, JobPhase
 from push_model.occupancy import OccupancyGrid as Grid
-from push_msgs.action import MoveObject
 from push_msgs.msg import Report as ReportMessage
 from push_ros.belief_feed import BeliefFeed
 from push_ros.commander import TeamCommander
 from push_ros.diagnostics import Diagnostics
 from push_ros.door import Door
+from push_ros.early_task import EarlyTask
 from push_ros.hosting import Hosting
 from push_ros.job_intake import JobIntake
 from push_ros.job_memory import JobMemory, KeptJob
@@ -47,6 +47,7 @@ from push_ros.pose_feed import Frame, PoseFeed
 from push_ros.process import run_node
 from push_ros.qos import STATUS
 from push_ros.report_conversions import report_to_ros
+from push_ros.task_outputs import TaskOutputs
 from push_ros.task_server import TaskServer
 from push_scenario.scenario import Scenario, load_scenario
 
@@ -54,7 +55,6 @@ PATIENCE = 10.0  # [s] without poses of the object after which a task ends
 _SILENCE = 0.3  # [s] without a frame after which goals are judged without
 _REPORTS = 0.05  # [s] of pose time between reports
 _WAITING = Status(int(JobPhase.IDLE), "IDLE", "waiting for a map")
-_EARLY = Status(int(JobPhase.PLANNING), "PLANNING", "waiting for a map")
 
 
 class MethodNode(Node):
@@ -97,13 +97,10 @@ class MethodNode(Node):
         self.settings, gate = declare_method(self, chosen, name, scenario)
         self.method: Method | None = None
         self._why_not = "there is no map yet"
-        self._early: Task | None = None  # taken before there was a map; begins when it is there
-        self._early_since = 0.0  # [s] on the clock for silence
-        self._early_end: Status | None = None  # how it ended, where it never began
+        self._early = EarlyTask()
         self._grid: Grid | None = None
         self._seen: Seen | None = None
         self._missing = 0.0  # [s] of pose time without the object
-        self._told: Status | None = None
         self._stamp, self._reported = Header().stamp, -math.inf
         self.planning_time = 0.0
         """[s] CPU time that the method's planning has taken so far."""
@@ -131,6 +128,8 @@ class MethodNode(Node):
             TaskServer(self, names.team(a.name), a, self, self._diagnostics.refuse)
             for a in hosting.actions(self)
         ]
+        log = self.get_logger().info
+        self._outputs = TaskOutputs(self._intake, self._servers, self._errors, log)
         MapFeed(self, names, self._diagnostics, self._take_map)
         self._watchdog = self.create_timer(
             0.1, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME)
@@ -162,11 +161,8 @@ class MethodNode(Node):
     @property
     def status(self) -> Status:
         """How the task stands."""
-        if self._early is not None:
-            return _EARLY
-        if self._early_end is not None:
-            return self._early_end
-        return self.method.status if self.method is not None else _WAITING
+        idle = self.method.status if self.method is not None else _WAITING
+        return self._early.status or idle
 
     @property
     def busy(self) -> bool:
@@ -209,8 +205,8 @@ class MethodNode(Node):
         """See JobOwner."""
         if code is JobError.CANCELED:
             self._door.drop(code, message)
-        if self._early is not None:
-            self._end_early(code, message)
+        if self._early.task is not None:
+            self._early.end(code, message)
         elif self.method is not None:
             self.method.end(code, message)
         self._look_after_task()
@@ -245,26 +241,19 @@ class MethodNode(Node):
         """See TaskHost."""
         self._waiting, self._missing = self._poses.clock.now, 0.0
         self._intake.keep(task)
-        self._early_end = None
         if self.method is not None:
+            self._early.forget()
             self.method.begin(task, self.beliefs.current)
         else:
-            self._early, self._early_since = task, self._poses.clock.now
+            self._early.wait(task, self._poses.clock.now)
         self._look_after_task()
-
-    def _end_early(self, code: JobError, message: str) -> None:
-        self._early = None
-        self._early_end = Status(int(JobPhase.IDLE), "IDLE", message, int(code))
 
     def _begin_early(self, refusal: GoalRefused | None) -> None:
         """A task that came before the map has been judged on the map."""
-        task, self._early = self._early, None
-        if task is None:
-            return
-        if refusal is None:
+        if refusal is not None:
+            self._early.end(refusal.code, str(refusal))
+        elif (task := self._early.forget()) is not None:
             self.take_task(task)
-        else:
-            self._end_early(refusal.code, str(refusal))
         self._look_after_task()
 
     # The world
@@ -279,8 +268,8 @@ class MethodNode(Node):
             self.method = self.spec.make(arena)
         except Unsuited as error:
             self.method, self._why_not = None, str(error)
-        if self._early is not None:
-            self._door.ask(self._early, self._begin_early)
+        if self._early.task is not None:
+            self._door.ask(self._early.task, self._begin_early)
         self._look_after_task()
 
     def _on_frame(self, frame: Frame) -> None:
@@ -320,7 +309,7 @@ class MethodNode(Node):
         others = self._poses.discs(self._roster.obstacles)
         ages = self._poses.ages((self.object, *robots), frame)
         self._seen = seen = Seen(self._poses.stamp, item, robots, others, ages=ages)
-        if method is None or self._early is not None or not self.busy:
+        if method is None or self._early.task is not None or not self.busy:
             return Told()
         began = time.thread_time()
         told = method.step(seen, self.beliefs.current)
@@ -347,7 +336,7 @@ class MethodNode(Node):
             self._door.go_on()
         if not self.busy:
             self._waiting = now
-        elif self._grid is None and now - self._early_since > PATIENCE:
+        elif self._grid is None and self._early.waited(now) > PATIENCE:
             topic = self.names.world("map")
             self.end_job(JobError.PLANNING_FAILED, f"no map has been received on {topic}")
         elif now - self._waiting > PATIENCE and self._poses.silence > PATIENCE:
@@ -357,54 +346,10 @@ class MethodNode(Node):
 
     def _look_after_task(self) -> None:
         """Tell how the task stands, and that it has ended."""
-        status, before = self.status, self._told
-        if status == before:
-            return
-        ended = before is not None and before.phase != JobPhase.IDLE
-        self._told = status
-        self._publish_status(status)
-        if ended and not self.busy:
-            self._finish(status)
-
-    def _publish_status(self, status: Status) -> None:
-        self._intake.publish(
-            self._poses.stamp,
-            robots=list(self.robots),
-            state=int(status.phase),
-            state_name=status.name,
-            reason=status.reason,
-            error_code=int(status.code),
-            progress=float(status.progress),
-            step_index=int(status.index),
-            step_count=int(status.count),
-            replans=int(status.replans),
-        )
-        self.get_logger().info(f"{status.name}: {status.reason}")
-        if self.busy:
-            away, _ = self._errors()
-            told = MoveObject.Feedback(state=int(status.phase), state_name=status.name)
-            told.push_index, told.push_count = int(status.index), int(status.count)
-            told.distance_to_goal = away
-            self._intake.feedback(told)
-            for server in self._servers:
-                server.feedback(status, away)
-
-    def _finish(self, status: Status) -> None:
-        away, turned = self._errors()
-        common = {
-            "error_code": int(status.code),
-            "error_msg": "" if status.code == JobError.NONE else status.reason,
-            "position_error": away,
-            "orientation_error": turned,
-        }
-        for server in self._servers:
-            server.finish(common, status)
-        if self._intake.waited_for:
-            done = {"pushes": int(status.pushes), "replans": int(status.replans)}
-            self._intake.finish(MoveObject.Result(**done, **common))
+        self._outputs.tell(self.status, self._poses.stamp, self.robots)
 
     def _errors(self) -> tuple[float, float]:
-        if self.method is None or self._seen is None or self._early is not None:
+        if self.method is None or self._seen is None or self._early.task is not None:
             return math.inf, math.inf
         return self.method.errors(self._seen)
 

@@ -1,5 +1,7 @@
 """The finite state machine of section 2.5. Events in, commands out; no ROS, no clock, no geometry.
 
+It carries out a plan as Algorithm 4 does.
+
 States S1-S6 are those of Fig. 2.24. Beyond the thesis: a push that goes wrong is followed by a
 retreat and a new plan from where the object is, a plan is dropped when the object was moved by
 somebody else, and every job ends with a code.

@@ -3,12 +3,18 @@
 Plots of studies come from the studies; docs/results.md names the command of each.
 """
 
+import base64
+import contextlib
+import io
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from pathlib import Path
+
+from PIL import Image
 
 from push_view.playback_server import PlaybackServer
 from tests.push_view.browser import CHROMIUM, Browser
@@ -16,16 +22,17 @@ from tests.system.test_page_live import Page
 
 IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
 RUNS = (
-    ("single", "env1-target1", ("env1-target1.png",)),
+    ("single", "env1-target1", ("env1-target1.png", "env1-target1.gif")),
     ("single", "env2-target2", ("env2-target2.png",)),
     ("single", "env3-target2", ("env3-target2.png",)),
     ("group", "group-ellipse", ("group-ellipse.png", "group-ellipse.gif")),
     ("swarm", "swarm-square", ("swarm-square.gif",)),
     ("swarm", "swarm-walls", ("swarm-walls.gif",)),
 )
-"""System, scenario, and the pictures that are made of its run."""
+"""System, scenario, and the pictures that are made of its run: of its whole path, or moving."""
 
-PRODUCT = {".png": "trajectory.png", ".gif": "animation.gif"}
+FRAMES = 60  # of a moving picture
+WIDTH = 420  # [px] of a moving picture
 PAGES = (("play.png", ("env1-target1", "group-ellipse"), 0.6),)
 """Picture of a playback, the runs that it shows, and the fraction of the time at which it does."""
 
@@ -44,7 +51,10 @@ def main(images: Path = IMAGES) -> int:
                 failed += 1
                 continue
             for name in names:
-                shutil.copy(out / PRODUCT[Path(name).suffix], images / name)
+                if name.endswith(".png"):
+                    shutil.copy(out / "trajectory.png", images / name)
+                elif CHROMIUM is not None:
+                    film(out / "bag", images / name)
         if CHROMIUM is None:
             print("without Chromium, pictures of the page are not made", file=sys.stderr)
             return 1
@@ -72,23 +82,59 @@ def shoot_live(picture: Path, folder: Path) -> None:
         page.close()
 
 
-def shoot(bags: list[Path], picture: Path, fraction: float) -> None:
-    """The page with bags at a fraction of their time."""
+def film(bag: Path, picture: Path) -> None:
+    """A moving picture of a bag, as the playback draws it; the last frame stays for a while."""
+    with playback([bag], 1100, 760) as browser:
+        browser.value("document.getElementById('zoom').style.display = 'none'")
+        frames = []
+        for k in range(FRAMES):
+            seek(browser, k / (FRAMES - 1))
+            frames.append(scene(browser))
+        colours = frames[-1].quantize(96)
+        images = [f.quantize(palette=colours, dither=Image.Dither.NONE) for f in frames]
+        durations = [80] * (FRAMES - 1) + [2000]
+        images[0].save(picture, save_all=True, append_images=images[1:], duration=durations, loop=0)
+
+
+def scene(browser: Browser) -> Image.Image:
+    """What the map shows now."""
+    frame = "document.getElementById('scene').getBoundingClientRect()"
+    x, y, width, height = browser.value(f"(r => [r.x, r.y, r.width, r.height])({frame})")
+    clip = {"x": x, "y": y, "width": width, "height": height, "scale": WIDTH / width}
+    shot = browser.call("Page.captureScreenshot", format="png", clip=clip)
+    return Image.open(io.BytesIO(base64.b64decode(shot["data"]))).convert("RGB")
+
+
+def seek(browser: Browser, fraction: float) -> None:
+    """Go to a fraction of the time."""
+    browser.value(
+        "new Promise(done => { const wait = setInterval(() => {"
+        "const s = document.getElementById('slider'); if (!s) return; clearInterval(wait);"
+        f"s.value = {fraction} * s.max; s.dispatchEvent(new Event('input'));"
+        "requestAnimationFrame(() => requestAnimationFrame(() => done(true))); }, 5); })"
+    )
+
+
+@contextlib.contextmanager
+def playback(bags: list[Path], width: int, height: int) -> Iterator[Browser]:
+    """A browser that shows bags."""
     server = PlaybackServer(bags, "127.0.0.1", 0)
     with tempfile.TemporaryDirectory() as profile:
-        browser = Browser(profile, 1280, 860)
+        browser = Browser(profile, width, height)
         try:
             browser.open(f"http://127.0.0.1:{server.port}/")
-            browser.value(
-                "new Promise(done => { const wait = setInterval(() => {"
-                "const s = document.getElementById('slider'); if (!s) return; clearInterval(wait);"
-                f"s.value = {fraction} * s.max; s.dispatchEvent(new Event('input'));"
-                "setTimeout(done, 500, true); }, 50); })"
-            )
-            browser.picture(picture)
+            yield browser
         finally:
             browser.close()
             server.close()
+
+
+def shoot(bags: list[Path], picture: Path, fraction: float) -> None:
+    """The page with bags at a fraction of their time."""
+    with playback(bags, 1280, 860) as browser:
+        seek(browser, fraction)
+        time.sleep(0.5)
+        browser.picture(picture)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,10 @@
 """The pages of docs against the code: error codes have their rows, and links lead somewhere."""
 
+import argparse
 import ast
 import importlib
 import re
+import shlex
 from enum import IntEnum
 from pathlib import Path
 
@@ -12,6 +14,7 @@ from grasp_opt.group_control import GroupControlSettings
 from grasp_opt.group_job import GroupJobSettings
 from grasp_opt.group_push import GroupPushSettings
 from grasp_opt.step_settings import StepSettings
+from planar_push.main import parser
 from push_model.jobs import JobError
 from push_mpc.settings import ControllerSettings, MpcSettings, TrackerSettings
 from push_mpc.task import TrackError
@@ -20,13 +23,17 @@ from push_mpc.torque_tracker import TorqueTrackerSettings
 from push_mpc.wheel_slip_nmpc import WheelSlipSettings
 from push_planner import PlanError, PlannerSettings
 from push_planner.robot_path import RobotPathError
+from push_study.study import experiment
 from push_supervisor import SupervisorSettings
 from swarm_push.agent import AgentSettings
 from swarm_push.laws import LawSettings
 from swarm_push.swarm_job import SwarmJobSettings
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+BUILT = ("start.md", "changelog.md", "contributing.md")  # copies that ``make docs`` makes
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md"] + [
+    p for p in sorted((ROOT / "docs").glob("*.md")) if p.name not in BUILT
+]
 ENUMS = {JobError: "MoveObject", PlanError: "PlanPush", TrackError: "FollowTrajectory"} | {
     RobotPathError: "PlanRobotPath"
 }
@@ -149,3 +156,41 @@ def test_the_text_of_a_parameter_stands_alone(path):
             assert not re.search(r"likewise|meanwhile|^Of |^By |^At |^\(|that it |whoever", text), (
                 text
             )
+
+
+def words_of(line):
+    """Words after ``planar-push`` without a comment; None where a placeholder is among them."""
+    start = re.search(r"(?:^|[ /])planar-push (.+)", re.split(r"  +#", line)[0])
+    if start and not re.search(r"…|<|\[|\b[A-Z]{2,}\b(?!=)|\b[XYTFK]\b", start[1]):
+        return shlex.split(start[1])
+    return None
+
+
+def understood(words):
+    """Options and choices exist, and so do the experiments, benches and scenarios."""
+    parsed = parser().parse_args(words)
+    scenarios = {p.stem for p in (ROOT / "config/scenarios").glob("*.yaml")}
+    if words[0] == "experiment":
+        named = set(filter(None, parsed.scenarios.split(",")))
+        assert named <= {*scenarios, *experiment(parsed.name).SCENARIOS}, words
+    scenario = getattr(parsed, "scenario", None) or "short"
+    assert scenario in scenarios or "/" in scenario or scenario.startswith("my_"), words
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_command_lines_of_a_page_are_understood(page):
+    text = page.read_text()
+    blocks = re.findall(r"^```(?:sh)?\n(.*?)^```", text, re.M | re.S)
+    for line in (line for block in blocks for line in block.splitlines()):
+        if words := words_of(line):
+            understood(words)
+    for line in re.findall(r"`((?:\.venv/bin/)?planar-push [^`\n]+)`", text):
+        words = words_of(line)
+        if words and words[0] in ("experiment", "bench", "demo", "launch") and len(words) > 1:
+            understood(words)
+        elif words:  # a mention of a command, perhaps of an option
+            verb = importlib.import_module(f"planar_push.{words[0].replace('-', '_')}")
+            options = argparse.ArgumentParser()
+            verb.add_arguments(options)
+            told = options.format_help()
+            assert all(w in told for w in words[1:] if w.startswith("--")), line

@@ -61,6 +61,17 @@ def test_a_registered_controller_is_made_by_its_name(monkeypatch):
     assert robot[:2] == pytest.approx([0.3, 0.0], abs=6e-3)
 
 
+OUTSIDE = ControllerKind(GainSettings, GainController)
+
+
+def test_a_controller_from_outside_is_named_by_its_module():
+    assert controller_kind(f"{__name__}:OUTSIDE") is OUTSIDE
+    with pytest.raises(SettingsError, match="controller: 'nowhere:X': No module named 'nowhere'"):
+        controller_kind("nowhere:X")
+    with pytest.raises(SettingsError, match="which is no ControllerKind"):
+        controller_kind(f"{__name__}:GainController")
+
+
 def test_every_controller_offers_what_the_tracker_asks_for():
     for name, kind in CONTROLLERS.items():
         controller = kind.make(kind.settings(), DRIVE)

@@ -47,6 +47,7 @@ class Browser:
         self._session = attached["sessionId"]
         self.call("Page.enable")
         self.call("Runtime.enable")
+        self.call("Log.enable")
         size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
         self.call("Emulation.setDeviceMetricsOverride", **size)
 
@@ -62,8 +63,16 @@ class Browser:
             if answer.get("id") == self._number:
                 assert "error" not in answer, answer["error"]
                 return answer["result"]
-            if answer.get("method") == "Runtime.exceptionThrown":
-                self.errors.append(answer["params"]["exceptionDetails"])
+            self._note(answer.get("method"), answer.get("params", {}))
+
+    def _note(self, event, told):
+        """Keep what the console shows as an error: exceptions, console.error, failed requests."""
+        if event == "Runtime.exceptionThrown":
+            self.errors.append(told["exceptionDetails"])
+        elif event == "Runtime.consoleAPICalled" and told["type"] in ("error", "assert"):
+            self.errors.append([a.get("value", a.get("description")) for a in told["args"]])
+        elif event == "Log.entryAdded" and told["entry"]["level"] == "error":
+            self.errors.append(told["entry"])
 
     def _read(self):
         while b"\0" not in self._buffer:

@@ -1,8 +1,9 @@
-"""A method that no package knows: this file. It runs as a node, in a study, on the page and in a
-bag, without an edit anywhere else.
+"""A method that no package knows, examples/bulldozer.py, runs as a node, in a study, on the page
+and in a bag, without an edit anywhere else.
 """
 
-import math
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,10 +12,9 @@ from rclpy.node import Node
 from planar_push.main import main
 from push_bringup.preparation import prepare
 from push_bringup.systems import nodes_of
-from push_job.method import Certificate, MethodSpec, Refusal, Task, Told
-from push_job.report import Figure, Report, Status, polyline
-from push_model.jobs import JobError, JobPhase
-from push_model.settings import SettingsError, bounded, settings
+from push_job.method import Task
+from push_model.jobs import JobError
+from push_model.settings import SettingsError
 from push_record.contents import load
 from push_record.recorder import RecorderNode
 from push_ros.names import Names
@@ -26,77 +26,8 @@ from push_study.uncertainty import uncertainty
 from push_view.report import write_report
 from push_view.report_panel import LivePanel
 
-NAME = f"{__name__}:METHOD"
-
-
-@settings
-class ShoveSettings:
-    """How hard the bulldozer shoves."""
-
-    speed: float = bounded(0.08, low=0.01, high=0.12, doc="Speed of a push (m/s).")
-    within: float = bounded(0.05, low=0.001, high=1.0, doc="Distance that counts as there (m).")
-
-
-class Bulldozer:
-    """One round robot that drives straight at an object which stands before it."""
-
-    def __init__(self, arena):
-        self._arena, self._settings = arena, arena.section("", ShoveSettings)
-        self._goal, self._code, self._reason = None, 0, "waiting for a goal"
-
-    @property
-    def status(self):
-        phase = JobPhase.PUSHING if self._goal is not None else JobPhase.IDLE
-        return Status(int(phase), phase.name, self._reason, self._code)
-
-    def assess(self, task, belief, seen):
-        if belief.object(self._arena.object).mass > 0.4:
-            return Refusal(JobError.TOO_HEAVY, "a bulldozer this small shoves no more than 0.4 kg")
-        return Certificate()
-
-    def begin(self, task, belief):
-        self._goal, self._code, self._reason = task.goal, 0, "shoving"
-
-    def step(self, seen, belief):
-        away, _ = self.errors(seen)
-        if away < self._settings.within:
-            self.end(JobError.NONE, "there")
-            return Told()
-        (name,) = seen.robots
-        ahead = seen.object[:2] - seen.robots[name][:2]
-        turn = math.remainder(math.atan2(ahead[1], ahead[0]) - seen.robots[name][2], 2.0 * math.pi)
-        return Told({name: (self._settings.speed, 2.0 * turn)})
-
-    def report(self, seen):
-        way = np.vstack([seen.object[:2], self._goal[:2]])
-        return Report("shove", (Figure("still to go", self.errors(seen)[0], "m"),),
-                      (polyline("beeline", way),))  # fmt: skip
-
-    def end(self, code, reason):
-        if self._goal is not None:
-            self._last, self._goal = self._goal, None
-            self._code, self._reason = int(code), reason
-
-    def revive(self):
-        pass
-
-    def release(self):
-        return frozenset(self._arena.robots) if self._goal is None else frozenset()
-
-    def errors(self, seen):
-        goal = self._goal if self._goal is not None else getattr(self, "_last", seen.object)
-        return float(np.hypot(*(seen.object - goal)[:2])), 0.0
-
-    def facts(self):
-        return {"make": "yellow"}
-
-
-def one_robot(robots, item):
-    if len(robots) != 1:
-        raise SettingsError(f"has {len(robots)} robots; a bulldozer works alone")
-
-
-METHOD = MethodSpec("bulldozer", Bulldozer, {"": ShoveSettings}, one_robot)
+sys.path.append(str(Path(__file__).resolve().parents[2] / "examples"))
+NAME = "bulldozer:METHOD"
 
 
 def scenario(count=1, mass=0.3, **parameters):
