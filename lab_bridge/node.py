@@ -38,6 +38,7 @@ from push_ros.parameters import declare_settings
 from push_ros.process import run_node
 from push_ros.qos import BELIEF, LATCHED, STATUS, STREAM
 from push_ros.report_conversions import belief_to_ros
+from push_ros.services import CALLS, Services
 from push_scenario.lab import EPuck2Link, LabSettings, TransformSource
 from push_scenario.scenario import Scenario, load_scenario
 from tf2_msgs.msg import TFMessage
@@ -105,7 +106,10 @@ class LabBridgeNode(Node):
         addresses = [(r.host, r.port) for r in lab.robots.values() if isinstance(r, EPuck2Link)]
         self._guard = Guard(addresses) if addresses else None
         self._pause(True)
-        self.create_service(SetBool, self._names.world("bridge/pause"), self._on_pause)
+        calls = Services(
+            self, self._names.world(CALLS), lambda: self._pose_clock.read(time.monotonic())
+        )
+        calls.serve(SetBool, self._names.world("bridge/pause"), self._on_pause)
         self._timer = self.create_timer(
             self.settings.tick, self._on_tick, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )

@@ -194,13 +194,19 @@ class _Comparer:
 
 
 def _after_start(bag: Path, start: dict[str, RawRecord]) -> Iterator[RawRecord]:
-    """Messages from the first tick on; the last one of each topic before it goes into ``start``."""
-    begun = False
+    """Messages from the first tick on; the last one of each topic before it goes into ``start``.
+
+    They end where time begins anew, because somebody reset the world or loaded another scenario.
+    """
+    begun, now = False, -1
     for record in read_raw(bag):
         last = record.topic.rpartition("/")[2]
         if last in WALL_TOPICS:
             continue
-        begun = begun or last == _CLOCK
+        if last == _CLOCK:
+            begun, before, now = True, now, record.stamp
+            if now < before:
+                return
         if begun:
             yield record
         else:

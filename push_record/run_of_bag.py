@@ -17,11 +17,15 @@ from push_record.bag import RawRecord, read_raw
 from push_record.contents import bag_scenario
 from push_record.interfaces import typestore
 from push_record.topics import team_names
+from push_ros.services import CALLS, RESTARTS
 from push_ros.validation import InvalidMessage, planar_pose
 from push_scenario.scenario import Scenario, scenario_from_text
 
 Goal = tuple[float, float, float]
 """x [m], y [m], heading [rad]."""
+
+Call = tuple[str, str, str]
+"""Full name of a service, its type, and the request as JSON."""
 
 _IDLE = 1  # state of JobState
 _POSE = "geometry_msgs/msg/PoseStamped"
@@ -30,15 +34,16 @@ _SAME = 1e-6  # [m], [rad] of two goals that are the same
 
 @dataclass(frozen=True)
 class Input:
-    """A message that somebody sent to the suite: a goal or a belief.
+    """What somebody sent to the suite: a goal, a belief, the call of a service.
 
-    team: whose goal it is; None for a belief. data: CDR bytes; or a goal ``(x, y, theta)`` that
-    came by an action and is known from the state of the job. time: [s] of the world when it was
+    team: whose goal it is; None for a belief and for a call. data: CDR bytes; or a goal
+    ``(x, y, theta)`` that came by an action and is known from the state of the job; or the call of
+    a service: name, type, request. time: [s] of the world when it was
     sent; negative before the first tick. after_job: the team's job before it had ended by then.
     """
 
     team: str | None
-    data: bytes | Goal
+    data: bytes | Goal | Call
     time: float
     after_job: bool
 
@@ -47,7 +52,8 @@ class Input:
 class RunOfBag:
     """A recorded run. world: what was simulated. repeatable: it ran in lockstep in one process.
 
-    start, end: [s] of the world at which the recording began and ended.
+    start, end: [s] of the world at which the recording began and ended; or time began anew.
+    restarted: whether it did, because somebody reset the world or loaded another scenario.
     """
 
     scenario: Scenario
@@ -60,6 +66,7 @@ class RunOfBag:
     end: float
     revision: str
     versions: dict[str, str]
+    restarted: bool = False
 
 
 class CannotRerun(SettingsError):
@@ -107,6 +114,7 @@ def run_of_bag(bag: Path) -> RunOfBag:
         seen.end,
         metadata.get("revision", ""),
         dict(json.loads(metadata.get("versions", "{}"))),
+        seen.restarted,
     )
 
 
@@ -118,12 +126,14 @@ class _Seen:
         names = next(iter(teams.values()))
         self._clock, self._scenario = names.world("clock"), names.world("scenario")
         self._belief = names.world("belief")
+        self._calls = {names.world(CALLS), *(n.team(CALLS) for n in teams.values())}
         self._goals = {n.team("goal_pose"): team for team, n in teams.items()}
         self._states = {n.team("job_state"): team for team, n in teams.items()}
         self._store = typestore()
         self.ticks = 0
         self.start = self.end = 0.0
         self.system = self.world = ""
+        self.restarted = False
         self._ended: dict[str, bool] = {}
         self._jobs: dict[str, int] = {}
         self._refusals: dict[str, int] = {}
@@ -131,7 +141,9 @@ class _Seen:
         self._begun: list[tuple[str, Goal, float, bool]] = []
 
     def take(self, record: RawRecord) -> None:
-        """Add a message."""
+        """Add a message; none counts after time has begun anew."""
+        if self.restarted:
+            return
         time = 1e-9 * record.stamp
         self.end = max(self.end, time) if self.ticks else 0.0
         if record.topic == self._clock:
@@ -141,11 +153,21 @@ class _Seen:
             self.world = self.world or str(self._message(record).data)
         elif record.topic in self._states:
             self._take_state(self._states[record.topic], record)
+        elif record.topic in self._calls:
+            self._take_call(record, time if self.ticks else -1.0)
         elif record.topic == self._belief or record.topic in self._goals:
             team = self._goals.get(record.topic)
             moment = time if self.ticks else -1.0
             ended = team is not None and self._ended.get(team, False)
             self._found.append(Input(team, bytes(record.data), moment, ended))
+
+    def _take_call(self, record: RawRecord, moment: float) -> None:
+        call = self._message(record)
+        if str(call.type) in RESTARTS:
+            self.restarted = bool(call.success)
+            return
+        told = str(call.service), str(call.type), str(call.request)
+        self._found.append(Input(None, told, moment, False))
 
     def inputs(self, live: bool) -> tuple[Input, ...]:
         """What was sent, in order. live: a goal has the time of the poses at which its job began,

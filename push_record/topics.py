@@ -21,11 +21,13 @@ from push_msgs.msg import (
     Poses,
     PushPlan,
     Report,
+    ServiceCall,
     Velocities,
     WheelTorques,
 )
 from push_ros.names import Names, inside, space
 from push_ros.qos import BELIEF, CLOCK, COMMAND, LATCHED, STATUS, STREAM
+from push_ros.services import CALLS
 from push_scenario.scenario import Scenario
 from tf2_msgs.msg import TFMessage
 
@@ -57,6 +59,7 @@ WORLD = {
     "scenario": Topic(String, LATCHED),
     "paused": Topic(Bool, LATCHED),
     "belief": Topic(Belief, BELIEF),
+    CALLS: Topic(ServiceCall, STATUS),
     "cmd_vels": Topic(Velocities, COMMAND),
     "tf": Topic(TFMessage, STATUS),
     "visualization": Topic(MarkerArray, STATUS),
@@ -72,6 +75,7 @@ TEAM = {
     "report": Topic(Report, STATUS),
     "job_state": Topic(JobState, LATCHED),
     "status_text": Topic(String, LATCHED),
+    CALLS: Topic(ServiceCall, STATUS),
 }
 """In the namespace of each team."""
 

@@ -28,6 +28,7 @@ from push_ros.job_keeper import PATIENCE, Bodies, JobKeeper
 from push_ros.job_memory import JobMemory, KeptJob
 from push_ros.names import Names
 from push_ros.qos import COMMAND, LATCHED
+from push_ros.services import CALLS, Services
 from push_ros.validation import FRAME, InvalidMessage, stamped_pose
 
 _SAME = 1e-6  # [m], [rad] within which a goal is the one that is pursued
@@ -94,6 +95,7 @@ class JobIntake:
         memory: of jobs; that of the process if it is not given."""
         self._keeper = JobKeeper(memory or JobMemory.of_process(), (item, *robots))
         self._run, self._since = "", math.nan
+        self._stamp = 0.0  # [s] of the last frame
         self._consider = consider or self._check
         self._node, self._owner, self._diagnostics = node, owner, diagnostics
         self._item = item
@@ -116,8 +118,9 @@ class JobIntake:
             cancel=lambda: self._owner.end_job(JobError.CANCELED, "canceled"),
         )
         node.create_subscription(String, names.world("world_run"), self._on_run, LATCHED)
-        node.create_service(Trigger, names.team("execute"), self._on_execute)
-        node.create_service(Trigger, names.team("cancel"), self._on_cancel)
+        services = Services(node, names.team(CALLS), lambda: self._stamp)
+        services.serve(Trigger, names.team("execute"), self._on_execute)
+        services.serve(Trigger, names.team("cancel"), self._on_cancel)
         node.create_subscription(
             PoseStamped,
             self._goal_topic,
@@ -183,6 +186,7 @@ class JobIntake:
         stamp: [s] of a frame. bodies: of the team, as it is seen at any later time too.
         ready: whether a job could be worked on. reached: targets of the task that are.
         """
+        self._stamp = stamp
         pending = self._keeper.pending is not None
         if not pending and not self._owner.busy and not self._owner.plan_ready:
             self._keeper.end()

@@ -19,10 +19,11 @@ from push_record.compare import Comparison, compare_bags
 from push_record.contents import BagContents, Job, State, load
 from push_record.parting import Parting, partings
 from push_record.revision import revision, versions
-from push_record.run_of_bag import CannotRerun, Input, RunOfBag, run_of_bag
+from push_record.run_of_bag import Call, CannotRerun, Input, RunOfBag, run_of_bag
 from push_ros.claims import own_domain
 from push_ros.names import space
 from push_ros.qos import BELIEF
+from push_ros.services import KINDS, from_json
 from push_scenario.scenario import Scenario
 from push_study.graph_run import LockstepRun
 
@@ -111,6 +112,8 @@ def rerun(
         f"running again: {run.system}, {run.scenario.name}, recorded {pace} from {run.start:.2f} s "
         f"to {run.end:.2f} s, {len(run.inputs)} messages to the suite"
     )
+    if run.restarted:
+        say(f"somebody started the world anew at {run.end:.2f} s; what follows is not run again")
     _run_again(run, scenario, world, out)
     if run.repeatable:
         return Rerun(run, out, setup, compare_bags(bag, out), (), ())
@@ -129,24 +132,58 @@ def _without_deadlines(scenario: Scenario) -> Scenario:
     return replace(scenario, parameters=nodes)
 
 
-class _Believer(Node):
-    """Sends the beliefs of a bag again."""
+class _Person(Node):
+    """Sends the beliefs of a bag again, and calls the services that were called.
 
-    def __init__(self, topic: str) -> None:
-        super().__init__("believer")
-        self._publisher = self.create_publisher(Belief, topic, BELIEF)
+    The publisher and the clients are there from the start: the nodes discover them before the first
+    tick.
+    """
 
-    def send(self, data: bytes) -> None:
-        self._publisher.publish(data)
+    def __init__(self, run: RunOfBag) -> None:
+        super().__init__("person")
+        self._publisher: Any = None
+        self._answer: Any = None
+        self._clients_of: dict[str, Any] = {}
+        for given in run.inputs:
+            if given.team is not None:
+                continue
+            if isinstance(given.data, bytes):
+                topic = f"{space(run.namespace)}belief"
+                self._publisher = self._publisher or self.create_publisher(Belief, topic, BELIEF)
+            else:
+                name, kind = str(given.data[0]), str(given.data[1])
+                if kind not in KINDS:
+                    raise CannotRerun(f"the service {name} has an unknown type, {kind}")
+                if name not in self._clients_of:
+                    self._clients_of[name] = self.create_client(KINDS[kind], name)
+
+    @property
+    def ready(self) -> bool:
+        """Whether every service is there."""
+        return all(client.service_is_ready() for client in self._clients_of.values())
+
+    def send(self, data: "bytes | Call") -> None:
+        """Publish a belief, or call a service."""
+        if isinstance(data, bytes):
+            assert self._publisher is not None
+            self._publisher.publish(data)
+            return
+        name, kind, request = data
+        self._answer = self._clients_of[name].call_async(from_json(KINDS[kind], request))
+
+    @property
+    def waits(self) -> bool:
+        """Whether a service has not answered yet; calls are made one after the other."""
+        return self._answer is not None and not self._answer.done()
 
 
 class _Inputs:
-    """Sends goals and beliefs of a bag when the world is where it was when they were sent."""
+    """Sends what a bag holds of people when the world is where it was when they sent it."""
 
-    def __init__(self, run: RunOfBag, graph: LockstepRun, believer: _Believer | None) -> None:
+    def __init__(self, run: RunOfBag, graph: LockstepRun, person: _Person) -> None:
         capture = run.world.parameters.get("bridge", {}).get("motion_capture", {})
         self._delay = 0.0 if run.repeatable else float(capture.get("latency", 0.0))
-        self._graph, self._believer = graph, believer
+        self._graph, self._person = graph, person
         self._left = deque(run.inputs)
         self._aimed: set[str] = set()
 
@@ -158,11 +195,10 @@ class _Inputs:
 
     def send(self, begun: bool = True) -> None:
         """Send what is due. begun: whether the world steps."""
-        while self._left and self._due(self._left[0], begun):
+        while self._left and not self._person.waits and self._due(self._left[0], begun):
             given = self._left.popleft()
             if given.team is None:
-                assert self._believer is not None and isinstance(given.data, bytes)
-                self._believer.send(given.data)
+                self._person.send(given.data)  # type: ignore[arg-type]
                 continue
             goal = given.data if isinstance(given.data, bytes) else np.array(given.data)
             self._graph.teams[given.team].send_goal(goal)
@@ -178,12 +214,11 @@ class _Inputs:
 
 
 def _run_again(run: RunOfBag, scenario: Scenario, world: Scenario, out: Path) -> None:
-    believers: list[_Believer] = []
+    people: list[_Person] = []
 
     def extra() -> list[Node]:
-        if any(given.team is None for given in run.inputs):
-            believers.append(_Believer(f"{space(run.namespace)}belief"))
-        return list(believers)
+        people.append(_Person(run))
+        return list(people)
 
     with (
         own_domain(),
@@ -197,8 +232,9 @@ def _run_again(run: RunOfBag, scenario: Scenario, world: Scenario, out: Path) ->
             record=out,
         ) as graph,
     ):
-        inputs = _Inputs(run, graph, next(iter(believers), None))
+        inputs = _Inputs(run, graph, people[0])
         graph.connect()
+        graph.spin_until(lambda: people[0].ready, math.inf, math.inf)
         inputs.send(begun=False)
         graph.bridge.start()
         writer, bridge = graph.recorder.writer, graph.bridge  # type: ignore[union-attr]

@@ -20,6 +20,7 @@ from push_ros.lone_bridge import refuse_second_bridge
 from push_ros.names import Names, space
 from push_ros.parameters import declare_settings
 from push_ros.process import run_node
+from push_ros.services import CALLS, Services
 from push_ros.validation import FARTHEST
 from push_scenario.events import Event
 from push_scenario.footing import Footing
@@ -83,12 +84,13 @@ class BridgeNode(Node):
         self.unanswered = 0
         """Ticks in lockstep that went on without an answer, because a commander had left."""
         self._build()
-        service, at = self.create_service, self._names.world
-        service(Reset, at("bridge/reset"), self._on_reset)
-        service(LoadScenario, at("bridge/load_scenario"), self._on_load)
-        service(SetBool, at("bridge/pause"), self._on_pause)
-        service(Displace, at("displace"), self._on_displace)
-        service(Kill, at("bridge/kill"), self._on_kill)
+        at = self._names.world
+        services = Services(self, at(CALLS), lambda: self.time)
+        services.serve(Reset, at("bridge/reset"), self._on_reset)
+        services.serve(LoadScenario, at("bridge/load_scenario"), self._on_load)
+        services.serve(SetBool, at("bridge/pause"), self._on_pause)
+        services.serve(Kill, at("bridge/kill"), self._on_kill)
+        services.serve(Displace, at("displace"), self._on_displace)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         wall = 0.05 if self.settings.lockstep else self.period / self.settings.real_time_factor
         self._timer = self.create_timer(max(wall, 1e-3), self._on_timer, clock=steady)

@@ -1,14 +1,18 @@
 """Runs in lockstep are repeated to the bit from their bags, and what differs is found."""
 
+import json
+
 import numpy as np
 import pytest
 import rclpy
 from rclpy.serialization import deserialize_message, serialize_message
+from std_srvs.srv import SetBool, Trigger
 
 from planar_push.main import main
 from push_model.belief import Interval
 from push_msgs.msg import Belief, ControllerStatus
-from push_record.bag import BagWriter, read_metadata, read_raw
+from push_msgs.srv import Displace, Kill, Reset
+from push_record.bag import BagWriter, read_bag, read_metadata, read_raw
 from push_record.contents import bag_scenario
 from push_record.topics import recorded_topics
 from push_ros.claims import own_domain
@@ -115,6 +119,46 @@ def test_goals_in_mid_job_and_beliefs_are_repeated(tmp_path, capsys):
     assert main(["rerun", str(bag)]) == 0
     told = capsys.readouterr().out
     assert "equal to the bit" in told and "4 messages to the suite" in told
+
+
+@pytest.mark.long
+def test_calls_of_services_are_repeated(tmp_path, capsys):
+    """The object is displaced in mid-push, the world paused and let go on, the job cancelled, a
+    robot killed; then the world is reset, and what follows is left out."""
+    bag = tmp_path / "bag"
+    people = []
+
+    def extra():
+        node = rclpy.create_node("person")
+        calls = (
+            (8.0, Displace, "/displace", {"name": "box", "relative": True, "y": 0.03}),
+            (20.0, SetBool, "/bridge/pause", {"data": True}),
+            (20.0, SetBool, "/bridge/pause", {"data": False}),
+            (30.0, Trigger, "/cancel", {}),
+            (31.0, Kill, "/bridge/kill", {"robot": "epuck1"}),
+            (32.0, Reset, "/bridge/reset", {"seed": 5}),
+        )
+        people.extend((at, kind, node.create_client(kind, name), f) for at, kind, name, f in calls)
+        return [node]
+
+    with own_domain(), LockstepRun(load_scenario("short"), extra, quiet=True, record=bag) as run:
+        run.start()
+        assert run.spin_until(lambda: all(c.service_is_ready() for _, _, c, _ in people), 5.0)
+        run.teams[""].send_goal(np.array([0.1, 0.04, 0.1]))
+        for at, kind, client, fields in people:
+            run.spin_until(lambda at=at: run.bridge.time >= at, 60.0)
+            answer = client.call_async(kind.Request(**fields))
+            assert run.spinner.until(answer.done, 60.0) and answer.result().success, kind
+        run.spin_until(lambda: 0.5 < run.bridge.time < 5.0, 60.0)
+    calls = [r.message for r in read_bag(bag, {"/service_calls"})]
+    assert [c.type.split("/")[-1] for c in calls] == [
+        *("Displace", "SetBool", "SetBool", "Trigger", "Kill", "Reset")
+    ]
+    assert all(c.success for c in calls) and json.loads(calls[0].request)["y"] == 0.03
+    assert main(["rerun", str(bag)]) == 0
+    told = capsys.readouterr().out
+    assert "equal to the bit" in told and "6 messages to the suite" in told
+    assert "somebody started the world anew at 32.0" in told
 
 
 @pytest.fixture(scope="module")
