@@ -79,8 +79,8 @@ def finite(text: str) -> float:
     return value
 
 
-def whole(least: int) -> Callable[[str], int]:
-    """A whole number from ``least`` on."""
+def whole(least: int, most: int | None = None) -> Callable[[str], int]:
+    """A whole number from ``least`` on, up to ``most`` where that is given."""
 
     def parse(text: str) -> int:
         try:
@@ -89,9 +89,18 @@ def whole(least: int) -> Callable[[str], int]:
             raise argparse.ArgumentTypeError(f"expected a whole number, got '{text}'") from None
         if value < least:
             raise argparse.ArgumentTypeError(f"expected at least {least}, got {value}")
+        if most is not None and value > most:
+            raise argparse.ArgumentTypeError(f"expected at most {most}, got {value}")
         return value
 
     return parse
+
+
+def add_port(parser: argparse.ArgumentParser) -> None:
+    """``--port`` of a page."""
+    parser.add_argument(
+        "--port", type=whole(0, 65535), default=8080, help="port; 0 chooses a free one"
+    )
 
 
 _asked: list[int] = []  # signals that arrived before anything could be stopped

@@ -75,7 +75,10 @@ def read_named(
         return value, where, folder
     path = Path(value)
     if path.suffix not in (".yaml", ".yml"):
-        path = find(kind, value)
+        try:
+            path = find(kind, value)
+        except SettingsError as error:
+            raise SettingsError(f"{where}: {error}") from None
     elif not path.is_absolute() and folder is not None:
         path = folder / path
     return read_yaml(path), str(path), path.parent

@@ -52,7 +52,16 @@ def test_every_shipped_type_is_sound(kind, cls):
     [
         ({"robots": {}}, ["robots", "at least one"]),
         ({"colour": 1}, ["unknown key 'colour'", "environment"]),
-        ({"environment": "atlantis"}, ["atlantis", "env1"]),
+        ({"environment": "atlantis"}, ["s.yaml.environment", "atlantis", "env1"]),
+        ({"robots": {"r": {"type": "x", "start": [0, 0, 0]}}}, ["s.yaml.robots.r.type", "'x'"]),
+        (
+            {
+                "environment": "atlantis",
+                "robots": {"r": {"type": "epuk", "start": [0, 0]}, "s": {"type": "euck"}},
+                "objects": {"b": {"type": "bocks", "start": [0, 0, 0]}},
+            },
+            ["atlantis", "'epuk'", "r.start", "'euck'", "s: missing key 'start'", "'bocks'"],
+        ),
         ({"robots": {"r": {"type": "epuck", "start": [0, 0]}}}, ["r.start", "[0, 0]"]),
         ({"robots": {"r": {"type": "epuck", "start": [0, 0, 0], "mass": -1}}}, ["mass", "-1"]),
         ({"robots": {"r r": {"type": "epuck", "start": [0, 0, 0]}}}, ["r r"]),
