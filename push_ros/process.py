@@ -107,7 +107,8 @@ def run_node(make: Callable[[], Node], arguments: Sequence[str] | None = None) -
 
     arguments: of the command line; those of this process when they are not given.
     SIGINT and SIGTERM end the spinning; the node's ``stop`` method, if it has one, is called while
-    it can still publish.
+    it can still publish. Before that, its method ``finish``, if it has one, is called with the
+    spinner, so that it can wait for messages that are still under way.
     """
     prepare_environment()
     stopping = False
@@ -125,6 +126,9 @@ def run_node(make: Callable[[], Node], arguments: Sequence[str] | None = None) -
         spinner = Spinner([node])
         while rclpy.ok() and not stopping:
             spinner.once(0.1)
+        finish = getattr(node, "finish", None)
+        if finish is not None:
+            finish(spinner)
         stop = getattr(node, "stop", None)
         if stop is not None:
             stop()
