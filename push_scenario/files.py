@@ -58,7 +58,8 @@ def find(kind: str, name: str) -> Path:
     candidate = config_directory() / kind / f"{name}.yaml"
     if not candidate.is_file():
         known = sorted(p.stem for p in candidate.parent.glob("*.yaml"))
-        raise SettingsError(f"no {kind} called '{name}'; known: {', '.join(known)}")
+        listed = ", ".join(known) or f"none, there is no file in {candidate.parent}"
+        raise SettingsError(f"no {kind} called '{name}'; known: {listed}")
     return candidate
 
 

@@ -106,6 +106,12 @@ def test_text_of_a_scenario_needs_no_other_file(tmp_path):
     assert again.parameters == {"bridge": {"seed": 9}}
 
 
+def test_a_folder_without_scenarios_is_named(tmp_path, monkeypatch):
+    monkeypatch.setenv("PLANAR_PUSH_CONFIG", str(tmp_path))
+    with pytest.raises(SettingsError, match=f"none, there is no file in {tmp_path}/scenarios"):
+        load_scenario("short")
+
+
 def test_malformed_yaml_names_the_file(tmp_path):
     path = tmp_path / "bad.yaml"
     path.write_text("robots: [}")
