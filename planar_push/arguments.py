@@ -3,6 +3,7 @@
 import argparse
 import math
 import signal
+import sys
 from collections.abc import Callable
 
 from push_bringup.job_result import JobEvent
@@ -115,7 +116,10 @@ def hear_signals() -> None:
 
     def handler(number: int, frame: object) -> None:
         _asked.append(number)
-        raise KeyboardInterrupt
+        interrupts = getattr(sys.modules.get("push_ros.process"), "INTERRUPTS", None)
+        if interrupts is None:  # nothing spins yet
+            raise KeyboardInterrupt
+        interrupts.interrupt()
 
     signal.signal(signal.SIGINT, handler)
     signal.signal(signal.SIGTERM, handler)
