@@ -3,6 +3,7 @@
 import argparse
 import math
 import signal
+import sys
 from collections.abc import Callable
 
 from push_bringup.job_result import JobEvent
@@ -79,8 +80,8 @@ def finite(text: str) -> float:
     return value
 
 
-def whole(least: int) -> Callable[[str], int]:
-    """A whole number from ``least`` on."""
+def whole(least: int, most: int | None = None) -> Callable[[str], int]:
+    """A whole number from ``least`` on, up to ``most`` where that is given."""
 
     def parse(text: str) -> int:
         try:
@@ -89,9 +90,18 @@ def whole(least: int) -> Callable[[str], int]:
             raise argparse.ArgumentTypeError(f"expected a whole number, got '{text}'") from None
         if value < least:
             raise argparse.ArgumentTypeError(f"expected at least {least}, got {value}")
+        if most is not None and value > most:
+            raise argparse.ArgumentTypeError(f"expected at most {most}, got {value}")
         return value
 
     return parse
+
+
+def add_port(parser: argparse.ArgumentParser) -> None:
+    """``--port`` of a page."""
+    parser.add_argument(
+        "--port", type=whole(0, 65535), default=8080, help="port; 0 chooses a free one"
+    )
 
 
 _asked: list[int] = []  # signals that arrived before anything could be stopped
@@ -106,7 +116,10 @@ def hear_signals() -> None:
 
     def handler(number: int, frame: object) -> None:
         _asked.append(number)
-        raise KeyboardInterrupt
+        interrupts = getattr(sys.modules.get("push_ros.process"), "INTERRUPTS", None)
+        if interrupts is None:  # nothing spins yet
+            raise KeyboardInterrupt
+        interrupts.interrupt()
 
     signal.signal(signal.SIGINT, handler)
     signal.signal(signal.SIGTERM, handler)

@@ -83,4 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
         publisher.publish(belief_to_ros(arguments.source or source, values))
         end = time.monotonic() + _SETTLE
         spinner.until(lambda: time.monotonic() > end, 2.0 * _SETTLE)
+    for (body, quantity), interval in values.items():
+        name = f"{body}.{quantity}" if body != POSES else quantity
+        print(f"{name} = {interval.value:g}, between {interval.low:g} and {interval.high:g}")
     return 0

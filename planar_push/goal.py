@@ -32,7 +32,8 @@ def run(arguments: argparse.Namespace) -> int:
     with Monitor(arguments.namespace, arguments.team, on_event=tell) as monitor:
         if not monitor.connect(_PATIENCE):
             print(
-                f"error: {monitor.missing()}; start a suite with: planar-push launch single",
+                f"error: {monitor.missing()}; start a suite with: planar-push launch single "
+                "(the system torque takes trajectories, not goals)",
                 file=sys.stderr,
             )
             return 1

@@ -6,7 +6,7 @@ import sys
 import time
 from pathlib import Path
 
-from planar_push.arguments import add_namespace, positive, whole
+from planar_push.arguments import add_namespace, add_port, positive
 from push_bringup.systems import check_namespace
 
 
@@ -14,7 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this verb."""
     parser.add_argument("bags", nargs="+", metavar="BAG", help="several are shown side by side")
     parser.add_argument("--host", default="127.0.0.1", help="address to serve the page on")
-    parser.add_argument("--port", type=whole(0), default=8080, help="port; 0 chooses a free one")
+    add_port(parser)
     parser.add_argument(
         "--publish",
         action="store_true",

@@ -3,7 +3,7 @@
 import argparse
 import sys
 
-from planar_push.arguments import add_namespace, add_scenario, whole
+from planar_push.arguments import add_namespace, add_port, add_scenario
 from push_bringup.systems import check_namespace
 
 
@@ -12,7 +12,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_scenario(parser, None)
     add_namespace(parser)
     parser.add_argument("--host", default="127.0.0.1", help="address to serve on")
-    parser.add_argument("--port", type=whole(0), default=8080, help="port; 0 chooses a free one")
+    add_port(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

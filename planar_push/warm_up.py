@@ -1,6 +1,13 @@
 """Compile the numerical kernels, so that no later run waits for it."""
 
 import argparse
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from push_job.method import MethodSpec
+    from push_scenario.scenario import Scenario
+
+_STEPS = 20  # of a method that is not simulated: it plans, and begins to move its robots
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -8,20 +15,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Use each kernel once."""
+    """Use each kernel once, as the nodes of every system do when they start and get a goal."""
+    print("compiling the numerical kernels")
+    _one_robot()
+    _torque()
+    _placements()
+    _methods()
+    return 0
+
+
+def _one_robot() -> None:
     import numpy as np
 
-    from grasp_opt.indices import composed_quality, extension, modified_hausdorff
-    from grasp_opt.object_trajectory import sinusoid
-    from grasp_opt.placement import Placer
     from push_mpc import LtvMpc, MpcSettings, TrackerSettings, TrajectoryTracker
     from push_planner import PlannerSettings, PushPlanner
-    from push_scenario.bodies import load_object, load_robot
     from push_scenario.scenario import load_scenario
     from sim_bridge.planar_world import PlanarWorld
-    from swarm_push.swarm_job import SwarmJob
 
-    print("compiling the numerical kernels")
     scenario = load_scenario("env1-target1")
     _, robot = scenario.robot()
     _, item = scenario.object()
@@ -31,11 +41,60 @@ def run(arguments: argparse.Namespace) -> int:
     PushPlanner(PlannerSettings(), scenario.grid, robot, item).solve(start, goal)
     with PlanarWorld(scenario.environment, scenario.robots, scenario.objects) as world:
         world.step(2)
+
+
+def _torque() -> None:
+    from push_mpc.wheel_slip_nmpc import WheelSlipNmpc, WheelSlipSettings
+    from push_scenario.scenario import load_scenario
+
+    _, robot = load_scenario("wheel-slip").robot()
+    WheelSlipNmpc(WheelSlipSettings(), robot).warm_up()
+
+
+def _placements() -> None:
+    import numpy as np
+
+    from grasp_opt.indices import composed_quality, extension, modified_hausdorff
+    from grasp_opt.object_trajectory import sinusoid
+    from grasp_opt.placement import Placer
+    from push_scenario.bodies import load_object
+
     placer = Placer(load_object("plate_ellipse"), sinusoid(0.0, 1.0, 0.5, 0.1, 0.1), 2, 0.05)
     contacts = placer.placement(placer.grid(24)[0]).contacts
     composed_quality(contacts.points, contacts.normals)
     extension(contacts.points)
     modified_hausdorff(np.ones((1, 3, 3)), np.ones((1, 3)))
-    room = np.array([[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]])
-    SwarmJob(room, load_object("swarm_square"), load_robot("epuck_ring")).warm_up()
-    return 0
+
+
+def _methods() -> None:
+    """The first steps of a group and of a swarm, in an open room and among walls."""
+    from grasp_opt.group_method import GROUP
+    from grasp_opt.warm_up import warm_up
+    from push_scenario.scenario import load_scenario
+    from swarm_push.swarm_method import SWARM
+
+    group = load_scenario("group-ellipse")
+    warm_up(group.object()[1], group.robot()[1])
+    for method, name in ((GROUP, "group-ellipse"), (SWARM, "swarm-square"), (SWARM, "swarm-walls")):
+        _begin(method, load_scenario(name))
+
+
+def _begin(method: "MethodSpec", scenario: "Scenario") -> None:
+    from push_job.method import Arena, Seen, Task
+    from push_model.belief import Belief
+
+    robots = {name: spec for name, (spec, _) in scenario.robots.items()}
+    item, spec = scenario.object()
+    belief = Belief({item: spec}, robots)
+    places = {name: start for name, (_, start) in scenario.robots.items()}
+    made = method.make(Arena(scenario.grid, robots, item, spec))
+    goal = scenario.goal
+    assert goal is not None
+    task = Task((goal,))
+    for k in range(_STEPS):
+        seen = Seen(0.01 * k, scenario.objects[item][1], places)
+        if k == 0:
+            made.assess(task, belief, seen)
+            made.begin(task, belief)
+        made.step(seen, belief)
+        made.report(seen)

@@ -120,7 +120,7 @@ class Belief:
         BeliefError: there is no such object. SettingsError: the values do not fit together.
         """
         if name not in self.objects:
-            raise BeliefError(f"unknown object '{name}'")
+            raise _unknown("object", name, self.objects)
         spec, found = self.objects[name], self._of(name)
         changes: dict[str, Any] = {
             k: found[k].value for k in ("mass", "floor_friction", "contact_friction") if k in found
@@ -170,7 +170,7 @@ class Belief:
         for body, outline in (outlines or {}).items():
             table = np.asarray(outline, dtype=np.float64)
             if body not in self.objects:
-                raise BeliefError(f"unknown object '{body}'")
+                raise _unknown("object", body, self.objects)
             if table.ndim != 2 or len(table) < 3 or not np.isfinite(table).all():
                 raise BeliefError(f"the outline of '{body}' is not three or more finite corners")
             corners[body] = tuple((float(x), float(y)) for x, y in table)
@@ -209,11 +209,15 @@ class Belief:
             return 0.0
         if q.kind == "robot":
             if body not in self.robots:
-                raise BeliefError(f"unknown robot '{body}'")
+                raise _unknown("robot", body, self.robots)
             return float(getattr(self.robots[body].drive, quantity, 0.0))
         if body not in self.objects:
-            raise BeliefError(f"unknown object '{body}'")
+            raise _unknown("object", body, self.objects)
         spec = self.objects[body]
         if quantity in ("com_x", "com_y"):
             return spec.com[quantity == "com_y"]
         return float(getattr(spec, quantity))
+
+
+def _unknown(kind: str, name: str, known: Mapping[str, object]) -> BeliefError:
+    return BeliefError(f"unknown {kind} '{name}'; the scenario has: {', '.join(known) or 'none'}")

@@ -1,10 +1,11 @@
 """Error messages for settings: where the problem is, and what was expected."""
 
+import contextlib
 import dataclasses
 import math
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any
 
 import pydantic
@@ -24,6 +25,29 @@ _TYPES = {
 
 class SettingsError(ValueError):
     """A setting is unknown, missing, of the wrong type or out of range."""
+
+
+class Gathered:
+    """Collects the errors of parts that are read one after another.
+
+    ``with gathered.part():`` around each part, then ``gathered.refuse()``.
+    """
+
+    def __init__(self) -> None:
+        self._lines: list[str] = []
+
+    @contextlib.contextmanager
+    def part(self) -> Iterator[None]:
+        """Read one part; its error is kept."""
+        try:
+            yield
+        except SettingsError as error:
+            self._lines.append(str(error))
+
+    def refuse(self) -> None:
+        """Raise a SettingsError with all errors so far, a line each, if there are any."""
+        if self._lines:
+            raise SettingsError("\n".join(self._lines))
 
 
 def explained(

@@ -167,6 +167,8 @@ def bag_file(bag: Path) -> Path:
     """The MCAP file of a bag folder, or the path itself."""
     if bag.is_file():
         return bag
+    if not bag.is_dir():
+        raise FileNotFoundError(f"{bag}: no such bag")
     files = sorted(bag.glob("*.mcap"))
     if not files:
         raise FileNotFoundError(f"{bag}: no .mcap file in it")

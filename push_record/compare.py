@@ -1,5 +1,6 @@
 """Two bags, message by message: equal to the bit, or the first difference."""
 
+import struct
 from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
@@ -204,13 +205,19 @@ def _after_start(bag: Path, start: dict[str, RawRecord]) -> Iterator[RawRecord]:
         if last in WALL_TOPICS:
             continue
         if last == _CLOCK:
-            begun, before, now = True, now, record.stamp
+            begun, before, now = True, now, _time(record)
             if now < before:
                 return
         if begun:
             yield record
         else:
             start[record.topic] = record
+
+
+def _time(record: RawRecord) -> int:
+    """[ns] that a message of the clock tells; it lies behind the four bytes of the CDR header."""
+    seconds, nanoseconds = struct.unpack_from("<iI", record.data, 4)
+    return 1_000_000_000 * int(seconds) + int(nanoseconds)
 
 
 def first_difference(

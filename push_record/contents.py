@@ -199,7 +199,7 @@ def bag_scenario(bag: Path) -> tuple[Scenario, dict[str, str]]:
     return scenario_from_text(metadata["scenario"], name, str(bag)), metadata
 
 
-def load(bag: Path, moments: float = _MOMENTS) -> BagContents:
+def load(bag: Path | str, moments: float = _MOMENTS) -> BagContents:
     """Read the data of a report, or of a playback.
 
     moments: [s] between whole reports that are kept, with their shapes.
@@ -208,6 +208,7 @@ def load(bag: Path, moments: float = _MOMENTS) -> BagContents:
     ------
     ValueError: the bag holds no scenario. FileNotFoundError: it is none.
     """
+    bag = Path(bag)
     scenario, metadata = bag_scenario(bag)
     collisions = Collisions(frozenset(scenario.robots), frozenset(scenario.objects))
     contents = BagContents(scenario, metadata, collisions)

@@ -18,14 +18,15 @@ from push_record.topics import recorded_topics
 from push_ros.conversions import time_from_ros
 from push_ros.latched import hear_latched
 from push_ros.names import names_of
-from push_ros.process import run_node
-from push_ros.qos import CLOCK
+from push_ros.process import Spinner, run_node
+from push_ros.qos import CLOCK, deep
 from push_scenario.scenario import Scenario, load_scenario, scenario_from_text
 
 LIVE = {"pace": "live"}
 """Metadata of a bag that a recorder in a process of its own writes."""
 
 _PATIENCE = 5.0  # [s] wall time to receive the scenario
+_QUIET, _TAIL = 0.2, 1.0  # [s] wall time without a message after which a bag is closed; at most
 
 
 def heard_scenario(namespace: str = "", limit: float | None = None) -> Scenario:
@@ -101,13 +102,14 @@ class RecorderNode(Node):
             },
         )
         self._sim_time = 0
+        self._last = 0.0  # [s] when a message arrived, by the monotonic clock
         for topic, kind in recorded_topics(scenario, world).items():
             self.writer.add_topic(topic, kind.type_name, kind.latched)
             self.create_subscription(
                 kind.message,
                 topic,
                 lambda data, t=topic: self._on_message(t, data),
-                kind.qos,
+                deep(kind.qos),
                 raw=True,
             )
         self.create_subscription(Clock, self._clock_topic, self._on_clock, CLOCK)
@@ -116,6 +118,7 @@ class RecorderNode(Node):
         self._sim_time = round(1e9 * time_from_ros(message.clock))
 
     def _on_message(self, topic: str, data: bytes) -> None:
+        self._last = time.monotonic()
         if self.writer.closed:
             return
         simulated = self._sim_time > 0 or self.count_publishers(self._clock_topic) > 0
@@ -124,6 +127,11 @@ class RecorderNode(Node):
         except OSError as error:  # e.g. the disk is full; written chunks stay readable
             self.get_logger().error(f"recording ends: {error}")
             self.writer.abandon()
+
+    def finish(self, spinner: Spinner) -> None:
+        """Record what was published before the suite was stopped and is still under way."""
+        self._last = time.monotonic()
+        spinner.until(lambda: time.monotonic() > self._last + _QUIET, _TAIL)
 
     def destroy_node(self) -> None:
         """Finish the bag too."""

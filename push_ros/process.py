@@ -5,8 +5,9 @@ import ctypes
 import os
 import signal
 import sys
+import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +56,42 @@ def heard(node: Node, publisher: Any, state_type: str = "push_msgs/msg/JobState"
     return bool(listeners & owners) and int(publisher.get_subscription_count()) >= len(known)
 
 
+class _Interrupts:
+    """Signals that arrive while the main thread spins.
+
+    An exception out of a callback makes rclpy print a traceback. The interrupt therefore waits
+    until the callback has returned. A second one does not wait.
+    """
+
+    def __init__(self) -> None:
+        self.spinning = self.waiting = False
+
+    def interrupt(self) -> None:
+        """Raise KeyboardInterrupt, now or at the end of the callback; for signal handlers."""
+        if self.spinning and not self.waiting:
+            self.waiting = True
+        else:
+            raise KeyboardInterrupt
+
+    @contextlib.contextmanager
+    def held(self) -> Iterator[None]:
+        """Spin once."""
+        if threading.current_thread() is not threading.main_thread() or self.spinning:
+            yield
+            return
+        self.spinning = True
+        try:
+            yield
+        finally:
+            self.spinning = False
+        if self.waiting:
+            self.waiting = False
+            raise KeyboardInterrupt
+
+
+INTERRUPTS = _Interrupts()
+
+
 class Spinner:
     """An executor for some nodes, spun by its owner.
 
@@ -73,7 +110,8 @@ class Spinner:
     def once(self, timeout: float = 0.1) -> None:
         """Handle what is there, or wait for it up to timeout [s]; without one rclpy may hang."""
         try:
-            self.executor.spin_once(timeout)
+            with INTERRUPTS.held():
+                self.executor.spin_once(timeout)
         except (RuntimeError, RCLError) as error:
             # Bytes that are no message of the topic's type: rclpy raises out of the executor.
             if not any(word in str(error).lower() for word in ("take", "deserial", "convert")):
@@ -107,7 +145,8 @@ def run_node(make: Callable[[], Node], arguments: Sequence[str] | None = None) -
 
     arguments: of the command line; those of this process when they are not given.
     SIGINT and SIGTERM end the spinning; the node's ``stop`` method, if it has one, is called while
-    it can still publish.
+    it can still publish. Before that, its method ``finish``, if it has one, is called with the
+    spinner, so that it can wait for messages that are still under way.
     """
     prepare_environment()
     stopping = False
@@ -125,6 +164,9 @@ def run_node(make: Callable[[], Node], arguments: Sequence[str] | None = None) -
         spinner = Spinner([node])
         while rclpy.ok() and not stopping:
             spinner.once(0.1)
+        finish = getattr(node, "finish", None)
+        if finish is not None:
+            finish(spinner)
         stop = getattr(node, "stop", None)
         if stop is not None:
             stop()

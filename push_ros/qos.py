@@ -22,6 +22,16 @@ LATCHED = QoSProfile(
 CLOCK = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 """/clock, as rclpy subscribes to it."""
 
+
+def deep(profile: QoSProfile) -> QoSProfile:
+    """The same for a subscriber that wants every message, such as a recorder."""
+    return QoSProfile(
+        depth=max(profile.depth, 1000),
+        reliability=profile.reliability,
+        durability=profile.durability,
+    )
+
+
 BELIEF = QoSProfile(
     depth=10, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )

@@ -9,6 +9,7 @@ import numpy as np
 
 from push_model.arrays import Array
 from push_model.settings import SettingsError, bounded, from_mapping, settings
+from push_model.settings_errors import Gathered
 from push_model.specs import ObjectSpec, RobotSpec
 from push_scenario.files import find, read_named, read_yaml
 from push_scenario.placements import Placement
@@ -72,24 +73,36 @@ def read_groups(
     ------
     SettingsError: names file, key, value and what was expected.
     """
-    own = {f.name for f in fields(BodyEntry)}
-    groups = []
-    for name, values_here in values.items():
-        here = f"{where}.{name}"
-        if not (name.isascii() and name.isidentifier()):
-            raise SettingsError(f"{here}: a name must be letters, digits and underscores")
-        if not isinstance(values_here, Mapping):
-            raise SettingsError(f"{here}: expected a mapping, got {values_here!r}")
-        changes = {k: v for k, v in values_here.items() if k not in own}
-        entry = from_mapping(BodyEntry, {k: v for k, v in values_here.items() if k in own}, here)
-        spec, source, _ = read_named(kind, entry.type, f"{here}.type", folder)
-        if not isinstance(spec, Mapping):
-            raise SettingsError(f"{source}: expected a name or a mapping, got {spec!r}")
-        made = from_mapping(cls, _changed(spec, changes), here if changes else source)
-        count = entry.count
-        names = (name,) if count is None else tuple(f"{name}{i + 1}" for i in range(count))
-        groups.append(Group(name, names, made, entry, here))
+    groups: list[Group[T]] = []
+    gathered = Gathered()
+    for name, entry in values.items():
+        with gathered.part():
+            groups.append(_group(cls, kind, name, entry, f"{where}.{name}", folder))
+    gathered.refuse()
     return groups
+
+
+def _group(
+    cls: type[T], kind: str, name: str, values: Any, where: str, folder: Path | None
+) -> Group[T]:
+    if not (name.isascii() and name.isidentifier()):
+        raise SettingsError(f"{where}: a name must be letters, digits and underscores")
+    if not isinstance(values, Mapping):
+        raise SettingsError(f"{where}: expected a mapping, got {values!r}")
+    own = {f.name for f in fields(BodyEntry)}
+    changes = {k: v for k, v in values.items() if k not in own}
+    gathered = Gathered()
+    with gathered.part():
+        entry = from_mapping(BodyEntry, {k: v for k, v in values.items() if k in own}, where)
+    with gathered.part():
+        spec, source, _ = read_named(kind, values.get("type", {}), f"{where}.type", folder)
+    gathered.refuse()
+    if not isinstance(spec, Mapping):
+        raise SettingsError(f"{source}: expected a name or a mapping, got {spec!r}")
+    made = from_mapping(cls, _changed(spec, changes), where if changes else source)
+    count = entry.count
+    names = (name,) if count is None else tuple(f"{name}{i + 1}" for i in range(count))
+    return Group(name, names, made, entry, where)
 
 
 def load_object(name: str) -> ObjectSpec:

@@ -58,7 +58,8 @@ def find(kind: str, name: str) -> Path:
     candidate = config_directory() / kind / f"{name}.yaml"
     if not candidate.is_file():
         known = sorted(p.stem for p in candidate.parent.glob("*.yaml"))
-        raise SettingsError(f"no {kind} called '{name}'; known: {', '.join(known)}")
+        listed = ", ".join(known) or f"none, there is no file in {candidate.parent}"
+        raise SettingsError(f"no {kind} called '{name}'; known: {listed}")
     return candidate
 
 
@@ -75,7 +76,10 @@ def read_named(
         return value, where, folder
     path = Path(value)
     if path.suffix not in (".yaml", ".yml"):
-        path = find(kind, value)
+        try:
+            path = find(kind, value)
+        except SettingsError as error:
+            raise SettingsError(f"{where}: {error}") from None
     elif not path.is_absolute() and folder is not None:
         path = folder / path
     return read_yaml(path), str(path), path.parent

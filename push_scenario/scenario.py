@@ -13,6 +13,7 @@ from typing import Any, Literal
 from push_model.arrays import Array
 from push_model.occupancy import MapSpec, OccupancyGrid, rasterise
 from push_model.settings import SettingsError, bounded, from_mapping, settings
+from push_model.settings_errors import Gathered
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
 from push_scenario.bodies import placed, read_groups
 from push_scenario.events import Event, check_names
@@ -243,9 +244,14 @@ def scenario_from_mapping(
     named = {"on" if k is True else k: v for k, v in values.items()}
     given = {k: v for k, v in named.items() if v is not None or k in needed}
     file = from_mapping(ScenarioFile, given, where)
-    environment = _environment(file.environment, f"{where}.environment", folder)
-    robots = read_groups(RobotSpec, "robots", file.robots, f"{where}.robots", folder)
-    objects = read_groups(ObjectSpec, "objects", file.objects, f"{where}.objects", folder)
+    gathered = Gathered()
+    with gathered.part():
+        environment = _environment(file.environment, f"{where}.environment", folder)
+    with gathered.part():
+        robots = read_groups(RobotSpec, "robots", file.robots, f"{where}.robots", folder)
+    with gathered.part():
+        objects = read_groups(ObjectSpec, "objects", file.objects, f"{where}.objects", folder)
+    gathered.refuse()
     _refuse_twice(
         [n for g in robots for n in g.names], [n for g in objects for n in g.names], where
     )

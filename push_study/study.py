@@ -130,14 +130,14 @@ def statistics_of(what: Any, rows: list[Row]) -> Mapping[str, Any]:
 def _refuse_unused(name: str, what: Experiment, options: StudyOptions) -> None:
     """FAULTS 29: an option that does nothing is refused by name."""
     why = {
-        "uncertainty": "its trials have none to choose",
-        "world": "it is that of its scenarios, bridge.world",
+        "uncertainty": "its trials have a fixed one",
+        "world": "its scenarios choose the world, by bridge.world",
     }
     defaults = StudyOptions((), 1, 1, Path())
     for option, reason in why.items():
         set_ = option in options.asked or getattr(options, option) != getattr(defaults, option)
         if set_ and option not in what.OPTIONS:
-            raise SettingsError(f"{option}: '{name}' does not use it: {reason}; leave it out")
+            raise SettingsError(f"--{option}: '{name}' does not use it: {reason}; leave it out")
 
 
 def complete(summary: dict[str, Any]) -> bool:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 SILENCE = 0.6
 """[s] wall time without a frame of poses after which the suite counts as gone."""
 
+_TO_DO = "choose a system under Start a suite, or use planar-push launch"
 _STUCK = 1.0  # [s] wall time within which the viewer must have checked the graph
 
 
@@ -41,7 +42,7 @@ class SuiteWatch:
             return "the viewer hangs"
         if not self._published:
             what = "no suite yet" if self.poses_at is None else "the suite is gone"
-            return f"{what}: nobody publishes {self.poses_topic}"
+            return f"{what}: nobody publishes {self.poses_topic}; {_TO_DO}"
         if self.paused:
             return ""
         if self.poses_at is None:

@@ -34,6 +34,10 @@ export function columns(lines) {
   })];
 }
 
+// Range of the vertical axis. uPlot would give a line that is zero throughout the range 0 to 100.
+export const span = (low, high) => low === null || low === undefined ? [0, 1]
+  : low === 0 && high === 0 ? [-0.1, 0.1] : uPlot.rangeNum(low, high, 0.1, true);
+
 export class Charts {
   // onTime: called with a time [s] that was clicked
   constructor(host, onTime) { this.host = host; this.onTime = onTime; this.plots = new Map(); this.marks = []; this.cursor = null; }
@@ -71,7 +75,7 @@ export class Charts {
     const axis = {stroke: ink, grid, ticks: grid, font: "11px system-ui", size: 46};
     const options = {
       title: title.startsWith("in ") ? `in ${unit}` : unit ? `${title} [${unit}]` : title, width: 300, height: HEIGHT,
-      scales: {x: {time: false}}, axes: [{...axis, size: 24}, axis], cursor: {sync: {key: "charts"}, drag: {setScale: false}},
+      scales: {x: {time: false}, y: {range: (_, low, high) => span(low, high)}}, axes: [{...axis, size: 24}, axis], cursor: {sync: {key: "charts"}, drag: {setScale: false}},
       series: [{label: "s", value: (_, v) => v?.toFixed(2) ?? "–"}, ...lines.map(({name}, i) => ({
         label: name, stroke: COLOURS[i % COLOURS.length], width: 1.5, dash: i > 2 ? [6, 3] : [], points: {show: false},
         value: (_, v) => v === null || v === undefined ? "–" : Number(v.toPrecision(4))}))],

@@ -44,7 +44,7 @@ def test_nothing_is_calibrated_beside_a_suite(domain, capsys):
     assert "a suite is running" in capsys.readouterr().err
 
 
-def test_a_calibration_is_told_to_the_nodes(ros, domain, tmp_path, monkeypatch):
+def test_a_calibration_is_told_to_the_nodes(ros, domain, tmp_path, monkeypatch, capsys):
     file = tmp_path / "c.yaml"
     numbers = {"value": 0.21, "low": 0.2, "high": 0.23}
     file.write_text(yaml.safe_dump({"values": {"box.contact_friction": numbers}}))
@@ -56,6 +56,12 @@ def test_a_calibration_is_told_to_the_nodes(ros, domain, tmp_path, monkeypatch):
     try:
         assert main(["belief", "--from", str(file), "latency=0.03"]) == 0
         assert spinner.until(lambda: heard, 5.0)
+        assert capsys.readouterr().out.splitlines() == [
+            "box.contact_friction = 0.21, between 0.2 and 0.23",
+            "latency = 0.03, between 0.03 and 0.03",
+        ]
+        assert main(["belief", "bx.mass=1"]) == 2
+        assert "unknown object 'bx'; the scenario has: box" in capsys.readouterr().err
     finally:
         spinner.close()
     (message,) = heard

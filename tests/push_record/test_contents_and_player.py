@@ -149,6 +149,24 @@ def test_the_recorder_hears_scenario_and_all_teams_of_its_namespace(tmp_path, te
     assert load(tmp_path / "bag").metadata["namespace"] == "/a/"
 
 
+def test_states_that_come_at_once_and_at_the_end_are_all_recorded(tmp_path, teams, ros):
+    """A job's last state is published just before the suite is stopped."""
+    bridge = rclpy.create_node("bridge")
+    state = bridge.create_publisher(JobState, "north/job_state", LATCHED)
+    recorder = RecorderNode(tmp_path / "bag", teams)
+    there = Spinner([bridge])
+    assert there.until(lambda: state.get_subscription_count() > 0, 10.0)
+    for k in range(20):
+        state.publish(JobState(reason=str(k)))
+    here = Spinner([recorder])
+    recorder.finish(here)
+    here.close()
+    there.close()
+    reasons = [r.message.reason for r in read_bag(tmp_path / "bag", {"/north/job_state"})]
+    assert reasons == [str(k) for k in range(20)]
+    assert load(str(tmp_path / "bag")).metadata["namespace"] == "/"
+
+
 def test_topics_of_one_of_teams_and_of_very_many(teams):
     short = load_scenario("short")
     assert {"/poses", "/goal_pose", "/epuck1/cmd_vel", "/scenario"} <= set(recorded_topics(short))

@@ -2,11 +2,13 @@
 
 import io
 import os
+import signal
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
+import pytest
 import rclpy
 from geometry_msgs.msg import PoseStamped
 from rclpy.action import ActionClient, ActionServer
@@ -16,8 +18,31 @@ from push_msgs.action import MoveObject
 from push_msgs.msg import JobState
 from push_ros.claims import claim_world, own_domain, world_is_claimed
 from push_ros.latched import has_publisher, hear_latched
-from push_ros.process import Spinner, heard
+from push_ros.process import INTERRUPTS, Spinner, heard
 from push_ros.qos import COMMAND, LATCHED
+
+
+def test_an_interrupt_waits_for_the_end_of_a_callback(ros, capfd):
+    """An exception out of a callback made rclpy print a traceback on Ctrl-C."""
+    before = signal.signal(signal.SIGINT, lambda *_: INTERRUPTS.interrupt())
+    node, done = rclpy.create_node("timed"), []
+
+    def callback():
+        os.kill(os.getpid(), signal.SIGINT)
+        done.append(True)
+
+    node.create_timer(0.01, callback)
+    spinner = Spinner([node])
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            spinner.until(lambda: False, 5.0)
+        assert done == [True]
+        with pytest.raises(KeyboardInterrupt):  # nothing spins
+            os.kill(os.getpid(), signal.SIGINT)
+    finally:
+        signal.signal(signal.SIGINT, before)
+        spinner.close()
+    assert "Exception" not in capfd.readouterr().err
 
 
 def test_another_subscriber_does_not_count(ros):

@@ -52,7 +52,16 @@ def test_every_shipped_type_is_sound(kind, cls):
     [
         ({"robots": {}}, ["robots", "at least one"]),
         ({"colour": 1}, ["unknown key 'colour'", "environment"]),
-        ({"environment": "atlantis"}, ["atlantis", "env1"]),
+        ({"environment": "atlantis"}, ["s.yaml.environment", "atlantis", "env1"]),
+        ({"robots": {"r": {"type": "x", "start": [0, 0, 0]}}}, ["s.yaml.robots.r.type", "'x'"]),
+        (
+            {
+                "environment": "atlantis",
+                "robots": {"r": {"type": "epuk", "start": [0, 0]}, "s": {"type": "euck"}},
+                "objects": {"b": {"type": "bocks", "start": [0, 0, 0]}},
+            },
+            ["atlantis", "'epuk'", "r.start", "'euck'", "s: missing key 'start'", "'bocks'"],
+        ),
         ({"robots": {"r": {"type": "epuck", "start": [0, 0]}}}, ["r.start", "[0, 0]"]),
         ({"robots": {"r": {"type": "epuck", "start": [0, 0, 0], "mass": -1}}}, ["mass", "-1"]),
         ({"robots": {"r r": {"type": "epuck", "start": [0, 0, 0]}}}, ["r r"]),
@@ -95,6 +104,12 @@ def test_text_of_a_scenario_needs_no_other_file(tmp_path):
     assert again.robot()[1] == scenario.robot()[1] and again.robot()[1].mass == 0.2
     assert again.environment == scenario.environment
     assert again.parameters == {"bridge": {"seed": 9}}
+
+
+def test_a_folder_without_scenarios_is_named(tmp_path, monkeypatch):
+    monkeypatch.setenv("PLANAR_PUSH_CONFIG", str(tmp_path))
+    with pytest.raises(SettingsError, match=f"none, there is no file in {tmp_path}/scenarios"):
+        load_scenario("short")
 
 
 def test_malformed_yaml_names_the_file(tmp_path):

@@ -188,6 +188,18 @@ def test_the_logic_of_a_drag(shown):
     assert {g is None for g in found} == {True, False}
 
 
+def test_the_range_of_a_chart_is_that_of_its_values(shown):
+    ranges = shown.value(
+        "(async () => { const {span} = await import('/charts.js');"
+        "return [span(0, 0), span(null, null), span(0, 20), span(2, 2)]; })()"
+    )
+    (low, high), nothing, (least, most), (below, above) = ranges
+    assert low < 0.0 < high < 1.0
+    assert nothing == [0, 1]
+    assert least <= 0.0 and 20.0 <= most <= 30.0
+    assert below < 2.0 < above
+
+
 def test_what_counts_as_silence(shown):
     """The page's own judgement, with a clock passed in."""
     assert shown.value(

@@ -234,6 +234,7 @@ def test_no_goal_is_taken_where_there_is_no_suite(ros, scenario):
     page = Page(scenario)
     try:
         assert page.until(lambda: "nobody publishes /poses" in page.node.suite()["trouble"])
+        assert "Start a suite" in page.node.suite()["trouble"]
         status, data = page.send(**GOAL)
         assert status == 409 and b"nobody publishes /poses" in data
         assert page.ask("POST", "/cancel", "{}")[0] == 409

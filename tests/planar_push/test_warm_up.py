@@ -1,0 +1,54 @@
+"""What ``planar-push warm-up`` compiles, and what is compiled after it: nothing."""
+
+import gc
+
+import pytest
+from numba.core.dispatcher import Dispatcher
+
+from planar_push import warm_up
+from push_job.method import Arena, Seen, Task, method_spec
+from push_model.belief import Belief
+from push_scenario.scenario import load_scenario
+from sim_bridge.planar_world import PlanarWorld
+
+_STEP = 0.01  # [s]
+
+
+def compiled():
+    """Every kernel with each of the argument types that it is compiled for."""
+    kernels = [o for o in gc.get_objects() if isinstance(o, Dispatcher)]
+    return {(k.py_func.__module__, k.py_func.__name__, s) for k in kernels for s in k.signatures}
+
+
+def pushed(name, method, seconds):
+    """Begin the job of a scenario with a method in the planar world."""
+    scenario = load_scenario(name)
+    robots = {n: spec for n, (spec, _) in scenario.robots.items()}
+    item, spec = scenario.object()
+    belief = Belief({item: spec}, robots)
+    made = method_spec(method).make(Arena(scenario.grid, robots, item, spec))
+    with PlanarWorld(scenario.environment, scenario.robots, scenario.objects) as world:
+        made.begin(Task((scenario.goal,)), belief)
+        for k in range(round(seconds / _STEP)):
+            poses = world.poses()
+            seen = Seen(k * _STEP, poses[item], {n: poses[n] for n in robots})
+            for robot, command in made.step(seen, belief).commands.items():
+                world.command(robot, *command[:2])
+            made.report(seen)
+            world.step(round(_STEP / world.time_step))
+    return made.status
+
+
+@pytest.mark.long
+def test_after_it_nothing_is_compiled():
+    assert warm_up.run(None) == 0
+    before = compiled()
+    assert len(before) > 30
+    for name, method in (
+        ("short", "one-robot"),
+        ("group-ellipse", "group"),
+        ("swarm-square", "swarm"),
+        ("swarm-walls", "swarm"),
+    ):
+        assert pushed(name, method, 20.0).phase > 0
+        assert sorted(compiled() - before) == [], name
