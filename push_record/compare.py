@@ -11,6 +11,7 @@ import numpy as np
 
 from push_record.bag import RawRecord, read_raw
 from push_record.interfaces import typestore
+from push_ros.services import CALLS, RESTARTS
 from push_scenario.files import parse_yaml
 
 WALL_TOPICS = ("diagnostics",)
@@ -208,6 +209,8 @@ def _after_start(bag: Path, start: dict[str, RawRecord]) -> Iterator[RawRecord]:
             begun, before, now = True, now, _time(record)
             if now < before:
                 return
+        if last == CALLS and any(kind.encode() in bytes(record.data) for kind in RESTARTS):
+            return
         if begun:
             yield record
         else:
