@@ -9,7 +9,9 @@ from planar_push.arguments import whole
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this verb."""
-    parser.add_argument("name", help="name of the study, e.g. single-robot")
+    folder = Path(__file__).resolve().parents[1] / "push_study" / "experiments"
+    names = sorted(p.stem.replace("_", "-") for p in folder.glob("[a-z]*.py"))
+    parser.add_argument("name", metavar="NAME", help=f"one of: {', '.join(names)}")
     parser.add_argument(
         "--scenarios", default="", help="comma-separated scenarios; default: those of the study"
     )

@@ -32,7 +32,7 @@ export function thinned(outline, scale) {
   return step < 2 || outline.length <= 12 ? outline : outline.filter((_, i) => i % step === 0);
 }
 
-const ended = team => team?.state?.state === "IDLE";
+const ended = team => team?.state?.state === "IDLE" && !team.state.plan_ready;
 
 // What can be shown or hidden: name and colour of each layer of a model, for the legend.
 export function layersOf(model, chosen) {

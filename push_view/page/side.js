@@ -35,7 +35,7 @@ function numbers(model, team) {
   if (state?.step[1]) rows.push(["step", `${state.step[0]} of ${state.step[1]}`]);
   if (state?.replans) rows.push(["new plans", `${state.replans}`]);
   const told = (team?.rows ?? []).map(r => [r.name, r.text, outside(r) ? "bad" : ""]);
-  if (told.length && !busy(team)) rows.push(["of the job that has ended:", "", "former"]);
+  if (told.length && !busy(team)) rows.push([state?.plan_ready ? "before this plan:" : "of the job that has ended:", "", "former"]);
   return [...rows, ...told.map(([k, v, c]) => [k, v, busy(team) ? c : "former"])];
 }
 

@@ -17,6 +17,7 @@ from push_model.jobs import JobError
 from push_record.bag import read_bag
 from push_record.contents import load
 from push_view.report import final_error
+from tests.system.processes import command
 
 pytestmark = pytest.mark.live
 ROOT = Path(__file__).resolve().parents[2]
@@ -165,3 +166,23 @@ def test_examples(domain, words):
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert "NONE: the goal is reached" in done.stdout
+
+
+@pytest.mark.long
+def test_the_example_drives_a_torque_robot(domain, tmp_path):
+    launched = command("launch", "torque", "--scenario", "wheel-slip", stdout=subprocess.PIPE)
+    try:
+        assert "send trajectories to" in launched.stdout.readline()
+        done = subprocess.run(
+            [sys.executable, str(ROOT / "examples" / "follow_a_trajectory.py"), "pioneer", "0.5"],
+            cwd=ROOT,
+            env=Launcher([])._environment | {"PYTHONPATH": str(ROOT)},
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+    finally:
+        launched.terminate()
+        launched.wait(20)
+    assert done.returncode == 0 and done.stdout.startswith("0: at its end"), done.stdout
