@@ -327,6 +327,7 @@ class PushPlanner:
             self.scene.drive,
             self.settings.push_speed,
             self.settings.push_acceleration,
+            self.settings.wheel_reserve,
         )
         curve, item = step.curve, self.scene.item
         return PushSegment(
