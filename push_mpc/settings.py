@@ -48,19 +48,19 @@ class MpcSettings:
         "angular acceleration",
     )
     max_acceleration: float = bounded(
-        0.3, low=0.01, high=20.0, doc="Limit of the linear acceleration (m/s^2)"
+        0.5, low=0.01, high=20.0, doc="Limit of the linear acceleration (m/s^2)"
     )
     max_turn_acceleration: float = bounded(
-        6.0, low=0.01, high=200.0, doc="Limit of the angular acceleration (rad/s^2)"
+        12.0, low=0.01, high=200.0, doc="Limit of the angular acceleration (rad/s^2)"
     )
     max_acceleration_change: float = bounded(
-        0.3,
+        0.5,
         low=0.001,
         high=50.0,
         doc="Limit of the change of the linear acceleration in one step (m/s^2)",
     )
     max_turn_acceleration_change: float = bounded(
-        6.0,
+        12.0,
         low=0.001,
         high=500.0,
         doc="Limit of the change of the angular acceleration in one step (rad/s^2)",
