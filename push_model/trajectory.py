@@ -128,6 +128,7 @@ def along_curve(
     speed: float,
     acceleration: float,
     reserve: float = 0.0,
+    turn_acceleration: float = math.inf,
 ) -> Trajectory:
     """Rest to rest along a smooth curve, as fast as the wheels and the limits allow.
 
@@ -139,18 +140,22 @@ def along_curve(
     drive: whose wheel speed bounds |v| (1 + half_track |kappa|).
     speed, acceleration: [m/s], [m/s^2] of the axle midpoint.
     reserve: fraction of the wheel speed that is left to a controller.
+    turn_acceleration: [rad/s^2] that a change of the speed on a bend may cause.
     """
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
     if way[-1] <= 0.0:
         raise ValueError("a curve needs a length")
     fastest = (1.0 - reserve) * drive.max_speed
     top = np.minimum(speed, fastest / (1.0 + drive.half_track * np.abs(curvature)))
+    bend = np.maximum(np.abs(curvature[1:]), np.abs(curvature[:-1]))
+    rate = np.minimum(acceleration, turn_acceleration / np.maximum(bend, 1e-9))
+    gain = 2.0 * rate * np.diff(way)  # of v^2 from sample to sample, at most
     v = top.copy()
     v[0] = v[-1] = 0.0
     for i in range(1, len(v)):
-        v[i] = min(v[i], math.sqrt(v[i - 1] ** 2 + 2.0 * acceleration * (way[i] - way[i - 1])))
+        v[i] = min(v[i], math.sqrt(v[i - 1] ** 2 + gain[i - 1]))
     for i in range(len(v) - 2, -1, -1):
-        v[i] = min(v[i], math.sqrt(v[i + 1] ** 2 + 2.0 * acceleration * (way[i + 1] - way[i])))
+        v[i] = min(v[i], math.sqrt(v[i + 1] ** 2 + gain[i]))
     pace = np.maximum(0.5 * (v[1:] + v[:-1]), 1e-6)
     time = np.concatenate([[0.0], np.cumsum(np.maximum(np.diff(way), 1e-9) / pace)])
     pose = np.column_stack([points, np.unwrap(heading)])

@@ -82,24 +82,23 @@ class _Curves:
         curvature = (d[:, 0] * dd[:, 1] - d[:, 1] * dd[:, 0]) / speed**3
         return points, np.arctan2(d[:, 1], d[:, 0]), curvature
 
-    def straighten(self, keeps: Keeps, tightest: float) -> None:
-        """Stop at the corners of every curve that does not keep its distances, or whose curvature
-        exceeds ``tightest`` [1/m]."""
+    def straighten(self, keeps: Keeps) -> None:
+        """Stop at the corners of every curve that does not keep its distances."""
         while True:
             legs = range(len(self.length))
-            failed = [leg for leg in legs if not self._keeps(leg, keeps, tightest)]
+            failed = [leg for leg in legs if not self._keeps(leg, keeps)]
             if not failed:
                 return
             for leg in failed:
                 self.through[leg : leg + 2] = False
 
-    def _keeps(self, leg: int, keeps: Keeps, tightest: float) -> bool:
+    def _keeps(self, leg: int, keeps: Keeps) -> bool:
         if not self.through[leg : leg + 2].any():
             return True  # the straight leg, which is known to keep them
         points, _, curvature = self.sample(leg)
         bend = float(np.abs(curvature).max())
         chord = float(np.hypot(*np.diff(points, axis=0).T).max())
-        return bend <= tightest and keeps(points, bend * chord**2 / 8.0)
+        return keeps(points, bend * chord**2 / 8.0)
 
     def pieces(self) -> list[tuple[Array, Array, Array]]:
         """The path from stop to stop: points, directions and curvatures as of ``sample``."""
@@ -140,15 +139,13 @@ def fastest_drive(
     corners = _without_short_legs(corners)
     if len(corners) < 2:
         return _Motion(start, drive, settings).end(goal)
-    # With a tighter curve, to begin to move would take more than the angular acceleration.
-    tightest = settings.turn_acceleration / settings.move_acceleration
     ways = []
     for astern, *curved in itertools.product((False, True), repeat=3):
         back = math.pi if astern else 0.0
         curves = _Curves(
             corners, float(start[2]) + back, float(goal[2]) + back, (curved[0], curved[1])
         )
-        curves.straighten(keeps, tightest)
+        curves.straighten(keeps)
         motion = _Motion(start, drive, settings)
         for piece in curves.pieces():
             motion.along(*piece, astern)
@@ -195,6 +192,7 @@ class _Motion:
             s.move_speed,
             s.move_acceleration,
             s.wheel_reserve,
+            s.turn_acceleration,
         )
         pose = ahead.pose + np.array([0.0, 0.0, float(self._pose[2]) - ahead.pose[0, 2]])
         twist = ahead.twist * np.array([-1.0 if astern else 1.0, 1.0])

@@ -99,6 +99,16 @@ def test_a_reserve_of_the_wheels_is_left_in_bends(kappa):
     assert wheel.max() == pytest.approx(0.9 * DRIVE.max_speed)
 
 
+def test_a_change_of_speed_on_a_bend_turns_no_faster_than_it_may():
+    angle = np.linspace(0, 2.0, 400)
+    points = 0.02 * np.column_stack([np.sin(angle), 1 - np.cos(angle)])
+    tight = along_curve(points, angle, np.full(400, 50.0), DRIVE, 0.1, 0.3, turn_acceleration=5.0)
+    rate = np.diff(tight.twist[:, 1]) / np.diff(tight.time)
+    assert np.abs(rate).max() == pytest.approx(5.0, rel=0.1)
+    freely = along_curve(points, angle, np.full(400, 50.0), DRIVE, 0.1, 0.3)
+    assert freely.duration < tight.duration
+
+
 def test_concatenated_heading_is_continuous():
     a = rotation(np.array([0, 0, 3.0]), 0.5, 1.0, 2.0)
     b = line(np.array([0, 0, 3.5 - 2 * math.pi]), 0.2, 0.1, 0.1)
