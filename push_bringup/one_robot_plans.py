@@ -18,6 +18,7 @@ from push_planner import (
     PushPlan,
     PushPlanner,
     TooHeavy,
+    joined,
     plan_among_bodies,
     plan_robot_path,
     warm_up,
@@ -71,7 +72,8 @@ class Plans:
             return None
         except StopIteration:
             assert self._best is not None
-            answer: events.Event = events.PlanFound(self._best.segments)
+            pushes = joined(self._best.segments, self._robot.differential, self._settings)
+            answer: events.Event = events.PlanFound(pushes)
         except TooHeavy as error:
             answer = events.PlanFailed(JobError.TOO_HEAVY, str(error))
         except PlanningFailed as failure:

@@ -10,14 +10,14 @@ from push_model.trajectory import Trajectory
 
 @dataclass(frozen=True)
 class PushSegment:
-    """The robot on one side of the object along one cubic curve, (2.2)-(2.4).
+    """The robot on one side of the object along one cubic curve, (2.2)-(2.4), or along several.
 
     Poses ``(3,)`` [m, m, rad] in the world frame; of the robot: its axle midpoint.
 
     side: index of the pushed side of the object's outline. standoff: where the robot's approach
-    begins. k_start, k_end [m]: tangent lengths of (2.4). length [m] of the robot's curve. limits:
-    stable curvatures for an object at its nominal place. clearance [m] of robot and object along
-    the path; infinite if unknown.
+    begins. k_start, k_end [m]: tangent lengths of (2.4), of the first and of the last curve.
+    length [m] of the robot's path. limits: stable curvatures for an object at its nominal place.
+    clearance [m] of robot and object along the path; infinite if unknown.
     """
 
     side: int

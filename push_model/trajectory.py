@@ -57,36 +57,46 @@ class Trajectory:
         return pose, twist
 
 
-def ramp(distance: float, top: float, acceleration: float, step: float) -> tuple[Array, Array]:
+def ramp(
+    distance: float, top: float, acceleration: float, step: float, braking: float | None = None
+) -> tuple[Array, Array]:
     """A rest-to-rest motion with trapezoidal speed over a distance [m].
 
-    top, acceleration: limits [m/s], [m/s^2] (or angles instead of lengths). step: [s] between
-    samples at most. Returns time [s] and distance [m] ``(n, 2)``, and speed [m/s] ``(n,)``.
+    top, acceleration, braking: limits [m/s], [m/s^2] (or angles instead of lengths); braking is as
+    acceleration if None. step: [s] between samples at most. Returns time [s] and distance [m]
+    ``(n, 2)``, and speed [m/s] ``(n,)``.
     """
-    peak = min(top, math.sqrt(distance * acceleration))
-    rise = peak / acceleration
-    cruise = max(0.0, distance / peak - rise)
-    total = 2.0 * rise + cruise
+    braking = acceleration if braking is None else braking
+    peak = min(top, math.sqrt(2.0 * distance / (1.0 / acceleration + 1.0 / braking)))
+    rise, fall = peak / acceleration, peak / braking
+    cruise = max(0.0, distance / peak - 0.5 * (rise + fall))
+    total = rise + cruise + fall
     t = np.linspace(0.0, total, max(9, math.ceil(total / step) + 1))
     back = total - t
     way = np.where(
         t < rise,
         0.5 * acceleration * t**2,
         np.where(
-            back < rise,
-            distance - 0.5 * acceleration * back**2,
+            back < fall,
+            distance - 0.5 * braking * back**2,
             0.5 * peak * rise + peak * (t - rise),
         ),
     )
-    speed = np.clip(np.minimum(t, back) * acceleration, 0.0, peak)
+    speed = np.clip(np.minimum(t * acceleration, back * braking), 0.0, peak)
     return np.column_stack([t, way]), speed
 
 
 def line(
-    start: Array, distance: float, speed: float, acceleration: float, step: float = 0.05
+    start: Array,
+    distance: float,
+    speed: float,
+    acceleration: float,
+    step: float = 0.05,
+    braking: float | None = None,
 ) -> Trajectory:
-    """Straight ahead from a pose ``(3,)``; backwards for a negative distance [m]."""
-    way, rate = ramp(max(abs(distance), 1e-6), speed, acceleration, step)
+    """Straight ahead from a pose ``(3,)``; backwards for a negative distance [m]. Limits as of
+    ``ramp``."""
+    way, rate = ramp(max(abs(distance), 1e-6), speed, acceleration, step, braking)
     sign = math.copysign(1.0, distance)
     pose = np.column_stack(
         [
@@ -117,6 +127,8 @@ def along_curve(
     drive: DifferentialDrive,
     speed: float,
     acceleration: float,
+    reserve: float = 0.0,
+    turn_acceleration: float = math.inf,
 ) -> Trajectory:
     """Rest to rest along a smooth curve, as fast as the wheels and the limits allow.
 
@@ -127,17 +139,23 @@ def along_curve(
     curvature: ``(n,)`` [1/m].
     drive: whose wheel speed bounds |v| (1 + half_track |kappa|).
     speed, acceleration: [m/s], [m/s^2] of the axle midpoint.
+    reserve: fraction of the wheel speed that is left to a controller.
+    turn_acceleration: [rad/s^2] that a change of the speed on a bend may cause.
     """
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
     if way[-1] <= 0.0:
         raise ValueError("a curve needs a length")
-    top = np.minimum(speed, drive.max_speed / (1.0 + drive.half_track * np.abs(curvature)))
+    fastest = (1.0 - reserve) * drive.max_speed
+    top = np.minimum(speed, fastest / (1.0 + drive.half_track * np.abs(curvature)))
+    bend = np.maximum(np.abs(curvature[1:]), np.abs(curvature[:-1]))
+    rate = np.minimum(acceleration, turn_acceleration / np.maximum(bend, 1e-9))
+    gain = 2.0 * rate * np.diff(way)  # of v^2 from sample to sample, at most
     v = top.copy()
     v[0] = v[-1] = 0.0
     for i in range(1, len(v)):
-        v[i] = min(v[i], math.sqrt(v[i - 1] ** 2 + 2.0 * acceleration * (way[i] - way[i - 1])))
+        v[i] = min(v[i], math.sqrt(v[i - 1] ** 2 + gain[i - 1]))
     for i in range(len(v) - 2, -1, -1):
-        v[i] = min(v[i], math.sqrt(v[i + 1] ** 2 + 2.0 * acceleration * (way[i + 1] - way[i])))
+        v[i] = min(v[i], math.sqrt(v[i + 1] ** 2 + gain[i]))
     pace = np.maximum(0.5 * (v[1:] + v[:-1]), 1e-6)
     time = np.concatenate([[0.0], np.cumsum(np.maximum(np.diff(way), 1e-9) / pace)])
     pose = np.column_stack([points, np.unwrap(heading)])

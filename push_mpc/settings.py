@@ -22,9 +22,10 @@ class MpcSettings:
 
     A soft constraint may be violated by the ``max_..._slack`` of its kind; beyond that the robot
     stops. In normal jobs with motion-capture noise the violation is zero. The bounds are what is
-    still harmless: wheels saturate anyway; 0.02 rad/s is the margin that ``friction_trust`` leaves
-    of an e-puck's curvature at the speed of a push; 5 mm are more than noise and dead reckoning
-    displace a robot by, and less than the 8 mm that the supervisor adds to the circles.
+    still harmless: wheels saturate anyway; 0.02 rad/s is less than the margin that
+    ``friction_trust`` leaves of an e-puck's curvature at the speed of a push; 5 mm are more than
+    noise and dead reckoning displace a robot by, and less than the 8 mm that the supervisor adds
+    to the circles.
     """
 
     step: float = bounded(0.1, low=0.01, high=1.0, doc="Length T_s of a predicted step (s)")
@@ -47,19 +48,19 @@ class MpcSettings:
         "angular acceleration",
     )
     max_acceleration: float = bounded(
-        0.3, low=0.01, high=20.0, doc="Limit of the linear acceleration (m/s^2)"
+        0.5, low=0.01, high=20.0, doc="Limit of the linear acceleration (m/s^2)"
     )
     max_turn_acceleration: float = bounded(
-        6.0, low=0.01, high=200.0, doc="Limit of the angular acceleration (rad/s^2)"
+        12.0, low=0.01, high=200.0, doc="Limit of the angular acceleration (rad/s^2)"
     )
     max_acceleration_change: float = bounded(
-        0.3,
+        0.5,
         low=0.001,
         high=50.0,
         doc="Limit of the change of the linear acceleration in one step (m/s^2)",
     )
     max_turn_acceleration_change: float = bounded(
-        6.0,
+        12.0,
         low=0.001,
         high=500.0,
         doc="Limit of the change of the angular acceleration in one step (rad/s^2)",

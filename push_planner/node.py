@@ -4,6 +4,7 @@ import math
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 from nav_msgs.msg import Path
@@ -26,6 +27,7 @@ from push_planner import (
     PushPlan,
     PushPlanner,
     TooHeavy,
+    joined,
     plan_among_bodies,
     plan_robot_path,
     warm_up,
@@ -242,9 +244,11 @@ class PlannerNode(Node):
         self._continue()
 
     def _publish(self, plan: PushPlan) -> None:
-        robot, _ = self._scenario.robot(self._request.robot)
+        robot, spec = self._scenario.robot(self._request.robot)
         item, _ = self._scenario.object(self._request.object)
         now = self._now()
+        pushes = joined(plan.segments, spec.differential, self.settings)
+        plan = replace(plan, segments=pushes)
         self._plan_message = plan_to_ros(plan, robot, item, now)
         self._plan_publisher.publish(self._plan_message)
         self._path_publisher.publish(path_to_ros([s.trajectory for s in plan.segments], now))

@@ -11,7 +11,6 @@ from push_model.distance_field import DistanceField
 from push_model.occupancy import OccupancyGrid
 from push_model.push_segment import PushSegment
 from push_model.specs import ObjectSpec, RobotSpec
-from push_model.trajectory import along_curve
 from push_planner.candidate_poses import along_guide, manoeuvres, nearby, runs, scattered
 from push_planner.guide_path import GuidePath, NoGuidePath, guide_paths, origin_floor
 from push_planner.narrow_way import lined_up
@@ -22,6 +21,7 @@ from push_planner.push_plan import (
     Progress,
     PushPlan,
 )
+from push_planner.push_reference import push_reference
 from push_planner.push_search import PushGraph, PushSearch, PushStep, SearchStatistics
 from push_planner.refusal import check_pose, check_room, why_not
 from push_planner.scene import PushScene
@@ -318,16 +318,7 @@ class PushPlanner:
 
     def segment(self, step: PushStep) -> PushSegment:
         """A push with its time-parametrised reference; object poses in the geometric frame."""
-        count = max(20, int(step.curve.length / 0.005))
-        points, heading, curvature = step.curve.sample(count)
-        trajectory = along_curve(
-            points,
-            heading,
-            curvature,
-            self.scene.drive,
-            self.settings.push_speed,
-            self.settings.push_acceleration,
-        )
+        trajectory = push_reference([step.curve], self.scene.drive, self.settings)
         curve, item = step.curve, self.scene.item
         return PushSegment(
             step.side.index,

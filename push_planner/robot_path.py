@@ -1,18 +1,18 @@
-"""A way for the robot alone between two poses: turns on the spot and straight lines."""
+"""A way for the robot alone between two poses."""
 
-import math
+import itertools
 from enum import IntEnum
 
 import numpy as np
 
-from push_model import se2
 from push_model.arrays import Array
 from push_model.disc_way import disc_way, reliefs
 from push_model.distance_field import DistanceField
 from push_model.obstacles import disc_capsules, scaled_capsules
-from push_model.room import room_at
+from push_model.room import room_at, segment_keeps
 from push_model.specs import RobotSpec
-from push_model.trajectory import Trajectory, concatenate, line, rotation
+from push_model.trajectory import Trajectory
+from push_planner.robot_drive import fastest_drive
 from push_planner.settings import PlannerSettings
 
 
@@ -41,7 +41,7 @@ def plan_robot_path(
     goal: Array,
     circles: Array,
 ) -> Trajectory:
-    """Short way that keeps the robot's turning circle clear of the map and of circles.
+    """Fast way that keeps the robot's turning circle clear of the map and of circles.
 
     It keeps ``safety_distance`` as well, but where start or goal has less it keeps what they have
     until it has come away from them.
@@ -82,28 +82,13 @@ def plan_robot_path(
             f"{2.0 * (robot.footprint_radius + settings.safety_distance):.3f} m",
         )
     points = np.vstack([start[:2], way[1:-1] * field.spacing + field.args[:2], goal[:2]])
-    return _drive(points, start, goal, settings)
 
+    def keeps(chords: Array, margin: float) -> bool:
+        at = (chords - field.args[:2]) * field.args[2]
+        wanted = need + margin * field.args[2]
+        return all(
+            segment_keeps(field.values, capsules, body, ends, wanted, *a, *b)
+            for a, b in itertools.pairwise(at)
+        )
 
-def _drive(points: Array, start: Array, goal: Array, settings: PlannerSettings) -> Trajectory:
-    parts: list[Trajectory] = []
-    heading = float(start[2])
-
-    def turn(at: Array, target: float) -> float:
-        angle = se2.wrap(target - heading)
-        if abs(angle) > 1e-3:
-            pose = np.array([at[0], at[1], heading])
-            parts.append(rotation(pose, angle, settings.turn_rate, settings.turn_acceleration))
-        return heading + angle
-
-    for a, b in zip(points[:-1], points[1:], strict=True):
-        gap = float(np.hypot(*(b - a)))
-        if gap < 2e-3:
-            continue
-        heading = turn(a, math.atan2(b[1] - a[1], b[0] - a[0]))
-        pose = np.array([a[0], a[1], heading])
-        parts.append(line(pose, gap, settings.move_speed, settings.move_acceleration))
-    heading = turn(goal[:2], float(goal[2]))
-    if not parts:
-        parts.append(rotation(start, 1e-4, settings.turn_rate, settings.turn_acceleration))
-    return concatenate(parts)
+    return fastest_drive(points, start, goal, keeps, robot.differential, settings)

@@ -131,25 +131,39 @@ class PlannerSettings:
         doc="Distance behind the contact from which a robot approaches the object (m)",
     )
     push_speed: float = bounded(
-        0.07, low=0.005, high=2.0, doc="Speed of the robot during a push (m/s)"
+        0.125,
+        low=0.005,
+        high=2.0,
+        doc="Greatest speed of the robot during a push (m/s); on curves the wheels and "
+        "wheel_reserve may require a lower one",
     )
     push_acceleration: float = bounded(
-        0.05, low=0.005, high=5.0, doc="Acceleration of the robot during a push (m/s^2)"
+        0.2,
+        low=0.005,
+        high=5.0,
+        doc="Acceleration of the robot at the beginning and at the end of a push (m/s^2)",
+    )
+    wheel_reserve: float = bounded(
+        0.04,
+        low=0.0,
+        high=0.9,
+        doc="Fraction of the maximum wheel speed that planned motions do not use, so that the "
+        "controller can correct errors (dimensionless)",
     )
     move_speed: float = bounded(
-        0.1, low=0.005, high=2.0, doc="Speed of the robot between two pushes (m/s)"
+        0.125, low=0.005, high=2.0, doc="Greatest speed of the robot between two pushes (m/s)"
     )
     move_acceleration: float = bounded(
-        0.15, low=0.005, high=5.0, doc="Acceleration of the robot between two pushes (m/s^2)"
+        0.3, low=0.005, high=5.0, doc="Acceleration of the robot between two pushes (m/s^2)"
     )
     turn_rate: float = bounded(
-        1.5,
+        4.0,
         low=0.05,
         high=10.0,
-        doc="Turn rate of the robot when it turns in place between two pushes (rad/s)",
+        doc="Greatest turn rate of the robot when it turns in place between two pushes (rad/s)",
     )
     turn_acceleration: float = bounded(
-        3.0,
+        7.0,
         low=0.05,
         high=50.0,
         doc="Angular acceleration of the robot when it turns in place between two pushes (rad/s^2)",

@@ -7,6 +7,7 @@ from pathlib import Path
 from push_planner import DistanceField, PlannerSettings, PushScene
 from push_scenario.scenario import Scenario
 from push_study.graph_run import LockstepRun
+from push_study.job_time import job_times
 from push_study.observer import Trace, final_errors
 from push_study.pool import Row
 
@@ -84,4 +85,5 @@ def run_job(
         "replans": 0 if state is None else int(state.replans),
         "applied_latency_s": latency,
         "applied_latency_std_s": spread,
+        **job_times(trace, believed.robot()[1].differential),
     }, trace

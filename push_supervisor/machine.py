@@ -4,7 +4,8 @@ It carries out a plan as Algorithm 4 does.
 
 States S1-S6 are those of Fig. 2.24. Beyond the thesis: a push that goes wrong is followed by a
 retreat and a new plan from where the object is, a plan is dropped when the object was moved by
-somebody else, and every job ends with a code.
+somebody else, and every job ends with a code. A job whose last push has brought the object to its
+goal ends with this push: the robot stays at the object, and backs off when the next job begins.
 """
 
 from collections.abc import Callable
@@ -268,10 +269,20 @@ class Machine:
                 self.index = following
                 self._push()
             else:
-                self._enter(State.DETACHING, f"push {following} of {len(self.segments)} is done")
-                self._say(commands.FollowRetreat())
+                self._pushed(following)
         else:
             self._detached()
+
+    def _pushed(self, done: int) -> None:
+        """The last push on this side is done; the robot backs off only if something follows."""
+        if done == len(self.segments):
+            there, error = self.at_goal(self.goal)
+            if there:
+                self._say(commands.Stop())
+                self._finish(JobError.NONE, f"the goal is reached: {error}")
+                return
+        self._enter(State.DETACHING, f"push {done} of {len(self.segments)} is done")
+        self._say(commands.FollowRetreat())
 
     def _push(self) -> None:
         self._enter(

@@ -31,11 +31,12 @@ def standoff(segment: PushSegment, item: Array) -> Array:
 def approach(
     segment: PushSegment, robot: Array, item: Array, settings: SupervisorSettings
 ) -> Trajectory:
-    """Straight on until contact, on the line through the contact pose."""
+    """Straight on until contact, on the line through the contact pose; braking towards it."""
     contact = segment.contact(item)
     ahead = float(se2.between(robot, contact)[0])
     begin = se2.compose(contact, np.array([-ahead, 0.0, 0.0]))
-    return line(begin, ahead, settings.approach_speed, settings.acceleration)
+    s = settings
+    return line(begin, ahead, s.approach_speed, s.acceleration, braking=s.contact_braking)
 
 
 def retreat(

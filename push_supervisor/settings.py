@@ -69,17 +69,25 @@ class SupervisorSettings:
         doc="Duration of one wait for other bodies to clear the way, in pose time (s).",
     )
     approach_speed: float = bounded(
-        0.04,
-        low=1e-3,
-        high=2.0,
-        doc="Speed of the robot when it approaches the object and backs off from it (m/s).",
-    )
-    acceleration: float = bounded(
         0.1,
         low=1e-3,
+        high=2.0,
+        doc="Greatest speed of the robot when it approaches the object and backs off from it "
+        "(m/s).",
+    )
+    acceleration: float = bounded(
+        0.3,
+        low=1e-3,
         high=10.0,
-        doc="Acceleration of the robot when it approaches the object and backs off from it "
-        "(m/s^2).",
+        doc="Acceleration of the robot when it begins to approach the object, and when it backs "
+        "off from it (m/s^2).",
+    )
+    contact_braking: float = bounded(
+        0.2,
+        low=1e-3,
+        high=10.0,
+        doc="Deceleration of the robot on its approach, at the end of which it touches the object "
+        "(m/s^2); a lower one makes the contact gentler where the pose of the object is not exact.",
     )
     detach_distance: float = bounded(
         0.06, low=5e-3, high=2.0, doc="Distance that the robot backs off after a push (m)."

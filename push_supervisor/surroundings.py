@@ -5,6 +5,7 @@ world frame. Pure geometry: the poses are passed in.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from push_supervisor.settings import SupervisorSettings
 
 _LOOK_AHEAD = 3.0  # [s] of full speed beside a motion within which obstacles matter
 _TOUCHING = 0.8  # of the distance that a robot backs off: nearer, it has not backed off
+_FASTEST = 0.9  # of its greatest speed, at which a robot approaches and backs off
 _NONE = np.zeros((0, 3))
 
 
@@ -139,7 +141,7 @@ class Surroundings:
 
     def approach(self, segment: PushSegment, robot: Array, item: Array) -> tuple[Trajectory, Array]:
         """To contact, keeping off walls."""
-        way = motions.approach(segment, robot, item, self.settings)
+        way = motions.approach(segment, robot, item, self._paced())
         return way, self._beside(self.walls, way)
 
     def push(self, segment: PushSegment) -> Array:
@@ -153,9 +155,14 @@ class Surroundings:
             beside, far = se2.between(item, robot), 2.0 * self._item_radius
             depth = motions.recess(beside, self._outline, self._hull, far)
         way = motions.retreat(
-            robot, lambda pose: self._gap(pose, item), self.walls, self.settings, depth
+            robot, lambda pose: self._gap(pose, item), self.walls, self._paced(), depth
         )
         return way, self._beside(self.walls, way)
+
+    def _paced(self) -> SupervisorSettings:
+        """The settings, with no greater speed than the robot's."""
+        fastest = _FASTEST * self.robot.max_speed
+        return replace(self.settings, approach_speed=min(self.settings.approach_speed, fastest))
 
     def _gap(self, robot: Array, item: Array) -> float:
         return gap(self._outline, robot, self._item_outline, item)

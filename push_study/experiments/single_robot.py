@@ -17,8 +17,9 @@ from push_model import se2
 from push_model.arrays import Array
 from push_model.settings import SettingsError
 from push_ros.claims import own_domain
-from push_scenario.scenario import load_scenario
+from push_scenario.scenario import Scenario, load_scenario
 from push_study.job import digest, run_job
+from push_study.job_time import STATES
 from push_study.pool import Row
 from push_study.study import StudyOptions
 from push_study.summary import known
@@ -30,18 +31,20 @@ from push_view.report import write_report
 
 SCENARIOS = tuple(f"env{e}-target{t}" for e in (1, 2, 3) for t in (1, 2, 3))
 """Where none are named."""
-OPTIONS = {"uncertainty": "mild"}
+OPTIONS = {"uncertainty": "mild", "world": "pybullet"}
+"""A scenario that names its world keeps it, unless another one is asked for."""
 
 
 @dataclass(frozen=True)
 class SingleRobotTask:
-    """One trial. uncertainty: its name. digest: of the scenario's text, so that a changed one is
-    another task."""
+    """One trial. uncertainty: its name. world: its kind. digest: of
+    the scenario's text, so that a changed one is another task."""
 
     scenario: str
     seed: int
     out: str
     uncertainty: str = "mild"
+    world: str = "pybullet"
     record: bool = False
     digest: str = ""
 
@@ -53,7 +56,7 @@ class SingleRobotTask:
 
 def tasks(options: StudyOptions) -> list[SingleRobotTask]:
     """One a scenario and seed; the first is recorded."""
-    digests = {}
+    digests, worlds = {}, {}
     level = uncertainty(options.uncertainty)
     for name in options.scenarios:
         scenario = load_scenario(name)
@@ -64,18 +67,27 @@ def tasks(options: StudyOptions) -> list[SingleRobotTask]:
         except SettingsError as error:
             raise SettingsError(f"scenario '{name}': {error}") from None
         digests[name] = digest(scenario)
+        worlds[name] = _world(scenario, options)
     return [
         SingleRobotTask(
             name,
             options.seed + i,
             str(options.out),
             options.uncertainty,
+            worlds[name],
             record=(i == 0 and j == 0),
             digest=digests[name],
         )
         for j, name in enumerate(options.scenarios)
         for i in range(options.trials)
     ]
+
+
+def _world(scenario: Scenario, options: StudyOptions) -> str:
+    default = OPTIONS["world"]
+    if "world" in options.asked or (options.world or default) != default:
+        return options.world
+    return str(scenario.parameters.get("bridge", {}).get("world", default))
 
 
 def trial(task: SingleRobotTask) -> Row:
@@ -87,6 +99,7 @@ def trial(task: SingleRobotTask) -> Row:
 def _push(task: SingleRobotTask) -> Row:
     level = uncertainty(task.uncertainty)
     believed, world, drawn = level.draw(load_scenario(task.scenario), task.seed)
+    believed, world = (s.settings("bridge", world=task.world) for s in (believed, world))
     folder = Path(task.out)
     folder.mkdir(parents=True, exist_ok=True)  # on a machine of a cluster, perhaps
     if task.record and (folder / "bag").exists():
@@ -116,6 +129,7 @@ def conclude(options: StudyOptions, tasks: Sequence[SingleRobotTask], rows: list
         files = [t.trace_file for t in tasks if t.scenario == name]
         _plot(name, [r for r in rows if r["scenario"] == name], files, options.out)
     _print_table(rows, list(options.scenarios))
+    _print_times(rows, list(options.scenarios))
 
 
 def _print_table(rows: list[Row], scenarios: list[str]) -> None:
@@ -138,6 +152,22 @@ def _print_table(rows: list[Row], scenarios: list[str]) -> None:
             f"{tp:>9s}   {o.mean():.4f} {o.std():.4f} {o.max():.4f} {to:>11s}"
         )
     print("(thesis: mean/worst of Table 2.1, real robots)")
+
+
+def _print_times(rows: list[Row], scenarios: list[str]) -> None:
+    """Means over the trials; see ``push_study.job_time`` for the shortest time."""
+    columns = ("job_time_s", *(f"{name.lower()}_s" for name in STATES), "shortest_time_s")
+    print("\nmean times [s]      job  plan  positioning  approach  push  detach   shortest  ratio")
+    for name in scenarios:
+        mine = [r for r in rows if r["scenario"] == name and "job_time_s" in r]
+        if mine:
+            job, *spent, least = (np.mean([r[c] for r in mine]) for c in columns)
+            ratio = np.mean([r["time_ratio"] for r in mine])
+            print(
+                f"{name:15s} {job:7.1f}{spent[0]:6.1f}{spent[1]:13.1f}{spent[2]:10.1f}"
+                f"{spent[3]:6.1f}{spent[4]:8.1f}{least:11.1f}{ratio:7.2f}"
+            )
+    print("(shortest: the faster wheel at its limit along the path that the robot drove)")
 
 
 def _plot(name: str, rows: list[Row], traces: list[Path], out: Path) -> None:

@@ -75,6 +75,40 @@ def test_curve_respects_wheels_and_acceleration():
     assert t.twist[-1] == pytest.approx([0, 0])
 
 
+def test_a_line_that_brakes_gently_takes_the_time_of_its_two_ramps():
+    """0.06 m, no cruise: peak^2 (1/a + 1/b) / 2 = 0.06 m, duration peak (1/a + 1/b)."""
+    t = line(np.zeros(3), 0.06, 1.0, 0.3, braking=0.1)
+    peak = math.sqrt(2.0 * 0.06 / (1.0 / 0.3 + 1.0 / 0.1))
+    assert t.duration == pytest.approx(peak * (1.0 / 0.3 + 1.0 / 0.1))
+    assert t.twist[:, 0].max() == pytest.approx(peak, rel=0.05)
+    before = t.sample(np.array([t.duration - 0.2]))[1][0, 0]
+    assert before == pytest.approx(0.02, rel=0.05), "0.2 s before the end, at 0.1 m/s^2"
+    assert t.pose[-1, 0] == pytest.approx(0.06) and t.pose[:, 0].max() <= 0.06 + 1e-9
+    way = np.trapezoid(t.twist[:, 0], t.time)
+    assert way == pytest.approx(0.06, rel=0.02)
+
+
+@pytest.mark.parametrize("kappa", [5.0, -5.0, 1e-3])
+def test_a_reserve_of_the_wheels_is_left_in_bends(kappa):
+    angle = np.linspace(0, kappa, 400)  # 1 m
+    points = np.column_stack([np.sin(angle), 1 - np.cos(angle)]) / kappa
+    t = along_curve(points, angle, np.full(400, kappa), DRIVE, 1.0, 1.0, reserve=0.1)
+    fastest = 0.9 * DRIVE.max_speed / (1.0 + abs(kappa) * DRIVE.half_track)
+    assert t.twist[:, 0].max() == pytest.approx(fastest)
+    wheel = np.abs(t.twist[:, 0]) + DRIVE.half_track * np.abs(t.twist[:, 1])
+    assert wheel.max() == pytest.approx(0.9 * DRIVE.max_speed)
+
+
+def test_a_change_of_speed_on_a_bend_turns_no_faster_than_it_may():
+    angle = np.linspace(0, 2.0, 400)
+    points = 0.02 * np.column_stack([np.sin(angle), 1 - np.cos(angle)])
+    tight = along_curve(points, angle, np.full(400, 50.0), DRIVE, 0.1, 0.3, turn_acceleration=5.0)
+    rate = np.diff(tight.twist[:, 1]) / np.diff(tight.time)
+    assert np.abs(rate).max() == pytest.approx(5.0, rel=0.1)
+    freely = along_curve(points, angle, np.full(400, 50.0), DRIVE, 0.1, 0.3)
+    assert freely.duration < tight.duration
+
+
 def test_concatenated_heading_is_continuous():
     a = rotation(np.array([0, 0, 3.0]), 0.5, 1.0, 2.0)
     b = line(np.array([0, 0, 3.5 - 2 * math.pi]), 0.2, 0.1, 0.1)

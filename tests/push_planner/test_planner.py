@@ -67,6 +67,25 @@ def test_plan_is_continuous_stable_and_free(plan, planner, scenario, box):
                 assert not exact.occupied[row, column]
 
 
+def test_pushes_are_as_fast_as_wheels_and_settings_allow(plan, planner, robot):
+    """Bends take the wheels to what their reserve leaves, and nothing exceeds push_speed."""
+    settings, drive = planner.settings, robot.drive
+    (segment,) = plan.segments
+    assert segment.length / segment.trajectory.duration > 0.9 * settings.push_speed
+    v, omega = segment.trajectory.twist.T
+    wheel = np.abs(v) + drive.half_track * np.abs(omega)
+    reserved = (1.0 - settings.wheel_reserve) * drive.max_speed
+    assert wheel.max() <= reserved + 1e-9 and v.max() <= settings.push_speed
+    rate = np.diff(v) / np.diff(segment.trajectory.time)
+    assert np.abs(rate).max() <= 1.1 * settings.push_acceleration
+    hasty = replace(settings, push_speed=2.0)
+    fast = PushPlanner(hasty, planner.scene.field, robot, planner.scene.item)
+    v, omega = fast.solve(START, GOAL).segments[0].trajectory.twist.T
+    wheel = np.abs(v) + drive.half_track * np.abs(omega)
+    assert np.sort(wheel)[len(wheel) // 2] == pytest.approx(reserved)
+    assert v[np.abs(omega) > 1.0 * v].max() < v.max(), "slower where it turns"
+
+
 def test_equal_seeds_give_equal_plans(planner, plan):
     again = planner.solve(START, GOAL)
     assert again.cost == plan.cost
@@ -223,9 +242,12 @@ def test_robot_path_goes_round_the_object(planner, robot):
         circle,
     )
     assert path.pose[-1] == pytest.approx([0.8, 0.0, 0.0], abs=1e-6)
-    assert np.hypot(path.pose[:, 0] - 0.5, path.pose[:, 1]).min() >= 0.2
-    # turns happen on the spot: never both at once
-    assert np.abs(path.twist[:, 0] * path.twist[:, 1]).max() == 0.0
+    kept = 0.2 + planner.settings.safety_distance
+    assert np.hypot(path.pose[:, 0] - 0.5, path.pose[:, 1]).min() >= kept - 1e-6
+    # it drives round in curves: between its first and its last turn it does not stop
+    driving = np.flatnonzero(path.twist[:, 0])
+    assert (path.twist[driving[0] : driving[-1], 0] != 0.0).all()
+    assert np.abs(path.twist[:, 0] * path.twist[:, 1]).max() > 0.05
 
 
 def test_no_robot_path_through_a_wall(robot):

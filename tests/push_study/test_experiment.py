@@ -127,7 +127,7 @@ def test_a_folder_that_holds_something_else_is_left_alone(tmp_path, capsys):
 def test_two_processes_are_not_at_one_study_at_once(tmp_path, capsys):
     out = tmp_path / "out"
     words = ["experiment", "single-robot", "--scenarios", "short", "--out", str(out)]
-    study = {"experiment": "single-robot", "seed": 1, "uncertainty": "mild"}
+    study = {"experiment": "single-robot", "seed": 1, "uncertainty": "mild", "world": "pybullet"}
     study["revision"] = revision()
     out.mkdir()
     (out / "study.json").write_text(json.dumps(study))

@@ -106,6 +106,20 @@ def test_algorithm_4_with_a_change_of_side():
     assert machine.state is State.IDLE and out[-1].code is JobError.NONE
 
 
+def test_the_last_push_ends_the_job_without_a_retreat():
+    machine, answer = make()
+    walk(machine, GOAL, planned(0, 1), PATH, DONE)
+    answer["there"] = True  # a goal that a push passes by ends nothing
+    assert commands(walk(machine, DONE, DONE)) == [FollowRetreat]
+    out = walk(machine, DONE, PATH, DONE, DONE)
+    assert machine.state is State.PUSHING and machine.index == 1
+    out = machine.handle(DONE)
+    assert commands(out) == [Stop, Finish] and out[-1].code is JobError.NONE
+    assert machine.state is State.IDLE and machine.pushes == 2 and "reached" in machine.reason
+    answer["there"], answer["touching"] = False, True
+    assert commands(machine.handle(GOAL)) == [FollowRetreat], "the next job begins with it"
+
+
 def test_waits_for_the_execute_command():
     machine, _ = make(auto_execute=False)
     walk(machine, GOAL, planned(0))

@@ -48,6 +48,18 @@ def test_approach_ends_in_contact_and_comes_along_the_normal(segment):
     assert way.twist[:, 0].max() <= SupervisorSettings().approach_speed + 1e-9
 
 
+@pytest.mark.parametrize("early", [0.002, 0.005])
+def test_an_object_that_is_nearer_than_it_seems_is_touched_gently(segment, early):
+    """v^2 = 2 a d, at a distance d from where the contact was expected."""
+    settings, item = SupervisorSettings(), np.array([0.1, 0.3, -0.4])
+    contact = segment.contact(item)
+    way = motions.approach(segment, motions.standoff(segment, item), item, settings)
+    left = np.hypot(*(way.pose[:, :2] - contact[:2]).T)
+    speed = np.interp(early, left[::-1], way.twist[::-1, 0])
+    assert speed == pytest.approx(np.sqrt(2.0 * settings.contact_braking * early), rel=0.1)
+    assert speed < 0.05 and way.duration < 1.3
+
+
 DISTANCE = SupervisorSettings().detach_distance
 NO_WALLS = np.zeros((0, 3))
 

@@ -97,6 +97,18 @@ def test_a_retreat_leads_away_from_the_object(around, robot, box):
     assert near > 50
 
 
+def test_a_slow_robot_is_not_asked_for_more_than_its_wheels_can(robot, box):
+    drive = replace(robot.drive, max_wheel_speed=2.0)  # 0.041 m/s
+    slow = Surroundings(replace(robot, drive=drive), box, {}, SETTINGS)
+    slow.take_map(rasterise(OPEN))
+    segment = push(robot, box, np.array([-0.5, 0.0, 0.0]))
+    for way in (
+        slow.approach(segment, segment.standoff, segment.object_start)[0],
+        slow.retreat(segment.robot_start, segment.object_start)[0],
+    ):
+        assert 0.03 < np.abs(way.twist[:, 0]).max() < drive.max_speed
+
+
 def test_walls_are_kept_on_the_approach(around, robot, box):
     """The object is touched, walls are not; a circle at the end is as wide as the end allows."""
     item = np.array([0.2, 0.0, 0.0])

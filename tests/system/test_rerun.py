@@ -189,7 +189,7 @@ def test_a_changed_parameter_is_named_with_what_it_changes_first(beginning, tmp_
     words = ["rerun", str(beginning), "--set", "planner.push_speed=0.06"]
     assert main([*words, "--out", str(tmp_path / "again")]) == 1
     told = capsys.readouterr().out
-    assert "parameters.planner.push_speed: 0.07 in the bag, 0.06 in the re-run" in told
+    assert "parameters.planner.push_speed: 0.125 in the bag, 0.06 in the re-run" in told
     (line,) = [t for t in told.splitlines() if t.startswith("first difference")]
     assert "/push_plan" in line and "trajectory" in line
     assert read_metadata(tmp_path / "again")["pace"] == "lockstep"

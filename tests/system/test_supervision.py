@@ -25,7 +25,8 @@ from push_supervisor.node import SupervisorNode
 from tests.push_planner.preemptive_case import needs_preemptive_push
 
 START = np.array([-0.45, 0.0, 0.0])
-RUNNING = ("PLANNING", "POSITIONING", "APPROACH", "PUSHING", "DETACHING")
+RUNNING = ("DETACHING", "PLANNING", "POSITIONING", "APPROACH", "PUSHING")
+"""In the order of a job whose robot is at the object when it begins."""
 
 
 class Run:
@@ -78,6 +79,15 @@ class Run:
         self.enters("PUSHING")
         x, y = self.run.observer.trace.object[-1][:2]
         self.until(lambda: np.hypot(*(self.run.observer.trace.object[-1][:2] - (x, y))) > way)
+
+    def at_the_object(self):
+        """The robot stands in contact, so that a job begins with backing off."""
+        name, robot = self.run.scenario.robot()
+        ((_, (x, y, _)),) = self.run.scenario.objects.values()
+        pose = np.array([x - robot.push_distance - 0.047, y, 0.0])
+        self.run.bridge.world.place(name, pose)
+        begun = self.run.bridge.time
+        self.until(lambda: self.run.bridge.time > begun + 0.5)
 
     def by_topic(self, goal):
         message = goal if isinstance(goal, PoseStamped) else pose_stamped_to_ros(goal, 0.0)
@@ -198,6 +208,7 @@ def goals_that_cannot_be(goal):
 
 def test_goals_that_cannot_be_leave_the_job_alone_in_each_of_its_states(run):
     """FAULTS 2 and 22, by topic and by action."""
+    run.at_the_object()
     run.by_topic(run.goal)
     refusals = 0
     for name in RUNNING:
@@ -219,6 +230,7 @@ def test_goals_that_cannot_be_leave_the_job_alone_in_each_of_its_states(run):
 
 def test_the_goal_that_is_pursued_changes_nothing_in_each_state(run):
     """FAULTS 28, by topic and by action, and as a flood."""
+    run.at_the_object()
     run.by_topic(run.goal)
     for name in RUNNING:
         run.enters(name)
@@ -314,6 +326,7 @@ def test_a_pause_in_any_state_freezes_the_job(run):
         node_timeout=0.5, answer_timeout=0.6, controller_timeout=0.3, pose_timeout=0.3
     )
     supervisor._apply(impatient)
+    run.at_the_object()
     run.by_topic(run.goal)
     for name in RUNNING:
         run.enters(name)

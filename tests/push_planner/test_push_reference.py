@@ -1,0 +1,74 @@
+"""Pushes in a row on the same side are one motion; others stay what they are."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from push_model import se2
+from push_model.occupancy import rasterise
+from push_model.specs import EnvironmentSpec
+from push_planner import PlannerSettings, PushPlanner, joined
+from push_planner.push_curve import shortest_push_curve
+from push_planner.push_search import PushStep
+
+SETTINGS = PlannerSettings()
+
+
+@pytest.fixture(scope="module")
+def planner(robot, box):
+    return PushPlanner(SETTINGS, rasterise(EnvironmentSpec((6.0, 4.0))), robot, box)
+
+
+def push(planner, number, start, end, clearance=0.3):
+    """A push on a side from one pose of the robot to another."""
+    side = planner.scene.sides[number]
+    trusted = side.trusted
+    curve = shortest_push_curve(start, end, trusted.minimum, trusted.maximum)
+    at, to = (se2.compose(pose, side.grasp) for pose in (start, end))
+    return planner.segment(PushStep(side, curve, at, to, clearance))
+
+
+BEGIN, MIDDLE, END = np.array([[-1.0, 0.0, 0.0], [0.0, 0.2, 0.3], [1.0, 0.2, -0.4]])
+
+
+def test_two_pushes_on_a_side_are_one_without_a_stop(planner, robot):
+    first = push(planner, 0, BEGIN, MIDDLE, 0.2)
+    second = push(planner, 0, MIDDLE, END, 0.1)
+    (whole,) = joined([first, second], robot.drive, SETTINGS)
+    t = whole.trajectory
+    assert t.pose[0] == pytest.approx(BEGIN) and t.pose[-1] == pytest.approx(END)
+    assert np.array_equal(whole.object_end, second.object_end) and whole.side == 0
+    assert whole.length == pytest.approx(first.length + second.length) and whole.clearance == 0.1
+    assert whole.grasp == pytest.approx(first.grasp)
+    at = np.hypot(*(t.pose[:, :2] - MIDDLE[:2]).T)
+    assert at.min() < 1e-9 and t.twist[at.argmin(), 0] > 0.1, "it passes there at full speed"
+    ramps = SETTINGS.push_speed / SETTINGS.push_acceleration
+    saved = first.trajectory.duration + second.trajectory.duration - t.duration
+    assert saved == pytest.approx(ramps, rel=0.1)
+    v, omega = t.twist.T
+    wheel = np.abs(v) + robot.drive.half_track * np.abs(omega)
+    assert wheel.max() <= (1.0 - SETTINGS.wheel_reserve) * robot.drive.max_speed + 1e-9
+    trusted = planner.scene.sides[0].trusted
+    assert (omega <= (trusted.maximum + 1e-3) * v).all()
+    assert (omega >= (trusted.minimum - 1e-3) * v).all()
+
+
+def test_a_change_of_side_parts_them(planner, robot):
+    runs = [push(planner, n, BEGIN, MIDDLE) for n in (0, 1, 1, 0)]
+    runs[2] = push(planner, 1, MIDDLE, END)
+    whole = joined(runs, robot.drive, SETTINGS)
+    assert [s.side for s in whole] == [0, 1, 0]
+    assert whole[0] is runs[0] and whole[2] is runs[3]
+    assert joined([], robot.drive, SETTINGS) == ()
+
+
+def test_a_single_push_keeps_its_reference(planner, robot):
+    one = push(planner, 0, BEGIN, END)
+    (same,) = joined([one], robot.drive, SETTINGS)
+    assert same is one
+    slow = replace(SETTINGS, push_speed=0.05)
+    again = joined(
+        [push(planner, 0, BEGIN, MIDDLE), push(planner, 0, MIDDLE, END)], robot.drive, slow
+    )
+    assert again[0].trajectory.twist[:, 0].max() == pytest.approx(0.05)
