@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from push_estimation.line_push_model import Bumper, Candidates, followed
-from push_estimation.push_windows import Facing, Window
+from push_estimation.push_windows import Window
+from push_estimation.pushed_side import Facing
 from push_model.arrays import Array, Mask
 from push_model.belief import Interval
 from push_model.limit_surface import uniform_pressure_radius
@@ -68,6 +69,13 @@ class PushPriorSettings:
         low=0.0,
         high=1.0,
         doc="Standard deviation of the predicted slip and turn, as a fraction of themselves.",
+    )
+    friction_error: float = bounded(
+        0.05,
+        low=0.0,
+        high=1.0,
+        doc="Half width that is added to the interval of the friction, as a fraction of the "
+        "friction: the pressure under a real object is not that of the model.",
     )
 
     def __post_init__(self) -> None:
@@ -226,24 +234,27 @@ class PushBelief:
         found = []
         for axis, edges in enumerate(self._edges):
             others = tuple(k for k in range(3) if k != axis)
-            found.append(_interval(edges, cube.sum(axis=others)))
+            wide = self._prior.friction_error if axis == 0 else 0.0
+            found.append(_interval(edges, cube.sum(axis=others), wide))
         return found[0], found[1], found[2]
 
 
-def _interval(edges: Array, share: Array) -> Interval:
+def _interval(edges: Array, share: Array, wide: float = 0.0) -> Interval:
     """Median and 95 % of a distribution over cells, taken as uniform within each.
 
-    Both ends are put out by half a cell, which is how far the grid can be wrong.
+    Both ends are put out by half a cell, which is how far the grid can be wrong, and by a fraction
+    ``wide`` of themselves.
     """
     total = np.concatenate([[0.0], np.cumsum(share)])
-    low, value, high = np.interp([0.025, 0.5, 0.975], total / total[-1], edges)
+    ends = np.interp([0.025, 0.5, 0.975], total / total[-1], edges)
+    low, value, high = (float(v) for v in ends)
     cell = np.diff(edges)
     first, last = (
         int(np.clip(np.searchsorted(edges, v) - 1, 0, len(cell) - 1)) for v in (low, high)
     )
-    low = max(float(edges[0]), float(low - cell[first] / 2.0))
-    high = min(float(edges[-1]), float(high + cell[last] / 2.0))
-    return Interval(float(value), low, high)
+    low = max(float(edges[0]), (low - float(cell[first]) / 2.0) * (1.0 - wide))
+    high = min(float(edges[-1]), (high + float(cell[last]) / 2.0) * (1.0 + wide))
+    return Interval(value, low, high)
 
 
 def _average(log: Array, density: Array) -> float:

@@ -13,7 +13,8 @@ from push_model.belief import Interval
 from push_model.bumpers import FlatBumper
 from push_model.specs import ObjectSpec, RobotSpec
 
-_NARROW = 0.5  # of the prior's width: an interval whose median is used instead of the file's value
+_SAME = 5.0  # [s] within which contradictions of one kind are the same
+_NARROW = 1.0 / 3.0  # of the prior's width: an interval whose median is used, not the file's value
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,8 @@ class PushEstimates:
             self._windows = PushWindows(item.outline, bumper)
         self.latency = StreamLatency(latency)
         self.contradictions: list[Contradiction] = []
+        self.told = 0
+        """Number of contradictions; those of the same kind that follow within 5 s count once."""
 
     def command(self, stamp: float, v: float, omega: float) -> None:
         """A command [m/s, rad/s] to the robot and the stamp [s] of the poses that it answers."""
@@ -102,7 +105,7 @@ class PushEstimates:
     def believed(self) -> dict[str, Interval]:
         """The same as others are to use it.
 
-        The value is the median where the interval is at most half as wide as the prior's. Otherwise
+        The value is the median where the interval is at most a third as wide as the prior's. Else
         little is known, and it is the value of the object's file, or the end of the interval that
         is nearest to it. The latency is left out until its interval is that narrow.
         """
@@ -120,6 +123,10 @@ class PushEstimates:
         return found
 
     def _note(self, time: float, names: tuple[str, ...], widened: bool, sentence: str) -> None:
-        if sentence:
-            self.contradictions.append(Contradiction(time, names, widened, sentence))
-            del self.contradictions[:-20]
+        if not sentence:
+            return
+        alike = [c for c in self.contradictions if c.sentence == sentence]
+        if widened or not alike or not 0.0 <= time - alike[-1].time < _SAME:
+            self.told += 1
+        self.contradictions.append(Contradiction(time, names, widened, sentence))
+        del self.contradictions[:-20]

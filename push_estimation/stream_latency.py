@@ -50,7 +50,7 @@ class LatencySettings:
         "alike in successive windows.",
     )
     floor: float = bounded(
-        1.5e-3,
+        3e-3,
         low=0.0,
         high=0.1,
         doc="Half width that is added to the interval, of errors that all windows share (s).",
