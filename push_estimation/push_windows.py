@@ -154,7 +154,7 @@ class PushWindows:
 def _fitted(t: Array, table: Array, degree: int) -> tuple[Array, Array]:
     """Coefficients ``(degree + 1, k)`` of polynomials fitted to columns, and variances ``(k,)``."""
     rows = t[:, None] ** np.arange(degree + 1)[None]
-    found: Array = np.linalg.lstsq(rows, table, rcond=None)[0]
+    found = np.asarray(np.linalg.lstsq(rows, table, rcond=None)[0], dtype=np.float64)
     left: Array = table - rows @ found
     scatter: Array = (left**2).sum(axis=0) / max(1, len(t) - degree - 1)
     return found, scatter
