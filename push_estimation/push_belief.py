@@ -31,7 +31,6 @@ _INSIDE = 0.8  # of the distance to the nearest side: where the centre of mass m
 _EVERY = 7  # cell of the prior that a window is always compared with
 _FORGOTTEN = 20.0  # log of the probability below the best cell's at which a cell is left out
 _UNSTEADY = 0.1  # of a change of the robot's turn rate within a window: error of its mean
-_KEPT = 12  # windows that are used again after the interval was widened
 
 
 @settings
@@ -124,12 +123,11 @@ class PushBelief:
         self._start = np.log(widths / widths.sum())
         self._radius = _radii(item, reach, self._cells[:, 1:])
         self._sides: dict[Facing, Candidates] = {}
-        self._recent: list[Window] = []
         self._sample = np.zeros(len(self._cells), dtype=np.bool_)
         self._sample[::_EVERY] = True
         self.windows = self.strange = self.widened = 0
         self.way = 0.0
-        """[m] of push that counted."""
+        """[m] of push that was seen, whether it counted or not."""
         self.prior = self._intervals(self._start)
         self.reset()
 
@@ -137,10 +135,12 @@ class PushBelief:
         """Know the prior only."""
         self._log = self._start.copy()
         self._odds = 0.0
-        self._recent.clear()
 
     def take(self, window: Window) -> Verdict:
         """Use a window."""
+        self.way += window.way
+        if self._closes(window):
+            return Verdict(False)
         chosen = self._sample | (self._log > float(self._log.max()) - _FORGOTTEN)
         density, best = self._density(window, chosen)
         if best > _STRANGE:
@@ -153,20 +153,15 @@ class PushBelief:
         every = self._sample
         expected = _average(self._start[every], density[every]) - _average(self._log, density)
         self._odds = max(0.0, self._odds + expected)
-        self._recent = [*self._recent, window][-_KEPT:] if self._odds > 0.0 else []
         self.windows += 1
-        self.way += window.way
         if self._odds > _CONTRADICTED:
-            recent = list(self._recent)
             self.reset()
-            for each in recent:
-                self._multiply(self._density(each)[0])
             self.widened += 1
             return Verdict(
                 True,
                 True,
                 "the latest motion contradicts what was believed of friction and centre of mass; "
-                "the intervals are widened and start anew",
+                "the intervals are those of the prior again",
             )
         self._multiply(density)
         return Verdict(True)
@@ -179,7 +174,19 @@ class PushBelief:
         log = self._log + self._prior.weight * density
         self._log = log - _total(log)
 
-    def _density(self, window: Window, chosen: Mask | None = None) -> tuple[Array, float]:
+    def _flush(self, window: Window) -> bool:
+        """Whether the contact is flush at the beginning, as far as the noise allows to say."""
+        lasted = len(window.drives) * window.step
+        return abs(window.start[1]) < max(_FLUSH, 1.5 * window.noise[1] * lasted)
+
+    def _closes(self, window: Window) -> bool:
+        """Whether an object that is not flush becomes flush in the window. When it does so within
+        the window is not known, so that the slopes say little."""
+        lasted = len(window.drives) * window.step
+        first, last = window.start[1], window.start[1] + lasted * float(window.slopes[1])
+        return not self._flush(window) and (abs(last) < _FLUSH or first * last < 0.0)
+
+    def _density(self, window: Window, chosen: Mask) -> tuple[Array, float]:
         """Log density ``(n,)`` of a window's slopes in each cell; the smallest squared deviation.
 
         chosen: the cells that are reckoned; the others get the density of an outlier.
@@ -188,10 +195,7 @@ class PushBelief:
         side = self._sides.get(window.facing)
         if side is None:
             side = self._sides[window.facing] = self._in_frame(window.facing)
-        if chosen is None:
-            chosen = np.ones(len(self._cells), dtype=np.bool_)
-        lasted = len(window.drives) * window.step
-        flush = abs(window.start[1]) < max(_FLUSH, 1.5 * window.noise[1] * lasted)
+        lasted, flush = len(window.drives) * window.step, self._flush(window)
         start = (window.start[0], 0.0 if flush else window.start[1])
         part = Candidates(
             *(v[chosen] for v in (side.friction, side.depth, side.aside, side.radius))

@@ -25,7 +25,7 @@ _SMALL = (1e-3, 6e-3)  # [m], [rad] root mean square that may be missing beside 
 _PLAIN = 0.05  # of the scatter's square: that of the motion below which a window tells nothing
 _STALE = 2000  # commands that are kept at least
 _OUTLIER = 0.01  # share of windows that anything may have happened in
-_CONTRADICTED = 6.0  # log of the odds of prior against posterior at which the interval is widened
+_CONTRADICTED = 7.0  # log of the odds of prior against posterior at which the interval is widened
 
 
 @settings
@@ -212,13 +212,13 @@ class StreamLatency:
         self._odds = max(0.0, self._odds + prior - (_total(self._log + log) - _total(self._log)))
         self.windows += 1
         if self._odds > _CONTRADICTED:
-            self._log, self._odds = log, 0.0
+            self._log, self._odds = np.zeros(len(self._grid)), 0.0
             self.widened += 1
             return LatencyVerdict(
                 True,
                 True,
-                "the latest motion contradicts the latency that was believed; the interval is "
-                "widened and starts anew",
+                "the latest motion contradicts the latency that was believed; the interval is that "
+                "of the prior again",
             )
         self._log = self._log + log
         self._log -= self._log.max()

@@ -164,7 +164,7 @@ class EstimatorNode(Node):
             state[name] = f"{i.value:.4g} [{i.low:.4g}, {i.high:.4g}]"
         push = estimates.push
         if push is not None:
-            state["metres of push used"] = f"{push.way:.2f}"
+            state["metres of push"] = f"{push.way:.2f}"
             state["windows"] = push.windows
             state["windows that no value explains"] = push.strange
             state["intervals widened"] = push.widened + estimates.latency.widened
