@@ -51,7 +51,7 @@ class PushPriorSettings:
         "(m).",
     )
     weight: float = bounded(
-        0.5,
+        0.3,
         low=0.01,
         high=1.0,
         doc="Power of the likelihood of a window. Below 1, because the errors of the model are "
@@ -70,11 +70,18 @@ class PushPriorSettings:
         doc="Standard deviation of the predicted slip and turn, as a fraction of themselves.",
     )
     friction_error: float = bounded(
-        0.05,
+        0.1,
         low=0.0,
         high=1.0,
         doc="Half width that is added to the interval of the friction, as a fraction of the "
         "friction: the pressure under a real object is not that of the model.",
+    )
+    com_error: float = bounded(
+        1e-3,
+        low=0.0,
+        high=0.1,
+        doc="Half width that is added to the intervals of the centre of mass (m), for the same "
+        "reason.",
     )
 
     def __post_init__(self) -> None:
@@ -108,8 +115,10 @@ class PushBelief:
         centre of mass stays well inside the object."""
         self._prior = s = prior or PushPriorSettings()
         self._bumper = bumper
-        least = max(min(s.friction_low, item.contact_friction / _BESIDE), 1e-3)
-        most = max(s.friction_high, item.contact_friction * _BESIDE)
+        low = max(min(s.friction_low, item.contact_friction / _BESIDE), 1e-3)
+        high = max(s.friction_high, item.contact_friction * _BESIDE)
+        # A friction at an end of the range may act as one beyond it, by the error of the model.
+        least, most = low * (1.0 - s.friction_error), high * (1.0 + s.friction_error)
         reach = min(s.com_radius, _INSIDE * _depth(item))
         mu = np.geomspace(least, most, _FRICTIONS + 1)
         place = np.linspace(-reach, reach, _PLACES + 1)
@@ -238,16 +247,17 @@ class PushBelief:
         found = []
         for axis, edges in enumerate(self._edges):
             others = tuple(k for k in range(3) if k != axis)
-            wide = self._prior.friction_error if axis == 0 else 0.0
-            found.append(_interval(edges, cube.sum(axis=others), wide))
+            s, cell = self._prior, cube.sum(axis=others)
+            wide = (s.friction_error, 0.0) if axis == 0 else (0.0, s.com_error)
+            found.append(_interval(edges, cell, *wide))
         return found[0], found[1], found[2]
 
 
-def _interval(edges: Array, share: Array, wide: float = 0.0) -> Interval:
+def _interval(edges: Array, share: Array, share_more: float, more: float) -> Interval:
     """Median and 95 % of a distribution over cells, taken as uniform within each.
 
-    Both ends are put out by half a cell, which is how far the grid can be wrong, and by a fraction
-    ``wide`` of themselves.
+    Both ends are put out by half a cell, which is how far the grid can be wrong, by a fraction of
+    themselves, and by ``more``.
     """
     total = np.concatenate([[0.0], np.cumsum(share)])
     ends = np.interp([0.025, 0.5, 0.975], total / total[-1], edges)
@@ -256,8 +266,8 @@ def _interval(edges: Array, share: Array, wide: float = 0.0) -> Interval:
     first, last = (
         int(np.clip(np.searchsorted(edges, v) - 1, 0, len(cell) - 1)) for v in (low, high)
     )
-    low = max(float(edges[0]), (low - float(cell[first]) / 2.0) * (1.0 - wide))
-    high = min(float(edges[-1]), (high + float(cell[last]) / 2.0) * (1.0 + wide))
+    low = max(float(edges[0]), (low - float(cell[first]) / 2.0) * (1.0 - share_more) - more)
+    high = min(float(edges[-1]), (high + float(cell[last]) / 2.0) * (1.0 + share_more) + more)
     return Interval(value, low, high)
 
 
