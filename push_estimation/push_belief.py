@@ -186,7 +186,8 @@ class PushBelief:
     def _flush(self, window: Window) -> bool:
         """Whether the contact is flush at the beginning, as far as the noise allows to say."""
         lasted = len(window.drives) * window.step
-        return abs(window.start[1]) < max(_FLUSH, 1.5 * window.noise[1] * lasted)
+        least = max(_FLUSH, 1.5 * float(window.noise[1]) * lasted)
+        return bool(abs(window.start[1]) < least)
 
     def _closes(self, window: Window) -> bool:
         """Whether an object that is not flush becomes flush in the window. When it does so within
