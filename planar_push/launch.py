@@ -23,6 +23,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--record", default="", help="folder of the bag to record")
     parser.add_argument("--view", action="store_true", help="serve the page too, on a free port")
     parser.add_argument("--respawn", action="store_true", help="restart nodes that die")
+    parser.add_argument(
+        "--estimate",
+        action="store_true",
+        help="estimate contact friction, centre of mass and latency while a single robot pushes",
+    )
     add_factor(parser)
     add_namespace(parser)
 
@@ -38,6 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
         namespace=arguments.namespace,
         record=arguments.record,
         factor=arguments.factor,
+        parameters={"estimator": {"enabled": True}} if arguments.estimate else None,
     )
     check_domain(setup.namespace)
     with tempfile.TemporaryDirectory("-planar-push") as folder:

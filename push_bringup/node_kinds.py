@@ -18,6 +18,8 @@ from grasp_opt.placement import PlacementSettings
 from grasp_opt.step_settings import StepSettings
 from lab_bridge.settings import LabBridgeSettings
 from push_estimation.pose_gate import PoseGateSettings
+from push_estimation.push_belief import PushPriorSettings
+from push_estimation.stream_latency import LatencySettings
 from push_job.method import MethodSpec, method_names, method_spec
 from push_model.settings import SettingsError
 from push_mpc.settings import ControllerSettings, MpcSettings, TrackerSettings
@@ -26,6 +28,7 @@ from push_mpc.torque_observer import TorqueObserverSettings
 from push_mpc.torque_tracker import TorqueTrackerSettings
 from push_mpc.wheel_slip_nmpc import WheelSlipSettings
 from push_planner import PlannerSettings
+from push_ros.estimator_node import EstimatorSettings
 from push_ros.roster import RosterSettings
 from push_scenario.scenario import Scenario
 from push_supervisor import SupervisorSettings
@@ -235,6 +238,19 @@ KINDS: dict[str, NodeKind] = {
             "friction": FrictionTrustSettings,
             **_GATED,
         },
+        listens=1,
+    ),
+    "estimator": NodeKind(
+        "push_ros.estimator_node",
+        "EstimatorNode",
+        lambda s: {
+            "robot": s.robot,
+            "item": s.item,
+            "namespace": s.namespace,
+            "world": s.world,
+        },
+        ("world", "robot", "object"),
+        {"": EstimatorSettings, "push": PushPriorSettings, "latency": LatencySettings, **_GATED},
         listens=1,
     ),
     "recorder": NodeKind(

@@ -84,7 +84,21 @@ def single(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
             NodeSpec(f"{prefix}planner", "planner", place, world, robot, item, team.name),
             NodeSpec(f"{prefix}supervisor", "supervisor", place, world, robot, item, team.name),
         ]
+        if _estimates(scenario):
+            nodes.append(_estimator(place, world, team))
     return tuple(nodes)
+
+
+def _estimates(scenario: Scenario) -> bool:
+    """Whether the scenario asks for estimators."""
+    return bool(scenario.parameters.get("estimator", {}).get("enabled", False))
+
+
+def _estimator(place: str, world: str, team: Team) -> NodeSpec:
+    """The estimator of a team of one robot."""
+    name = f"{team.name}/estimator" if team.name else "estimator"
+    robot = team.robots[0]
+    return NodeSpec(name, "estimator", place, world, robot, team.object, team.name)
 
 
 def torque(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
@@ -150,6 +164,8 @@ def method(name: str, scenario: Scenario, namespace: str = "") -> tuple[NodeSpec
                 team=team.name,
             )
         )
+        if _estimates(scenario) and len(team.robots) == 1:
+            nodes.append(_estimator(place, world, team))
     return tuple(nodes)
 
 

@@ -43,14 +43,19 @@ def names(cell):
 GROUP_NODES = {"group": ("group", "/"), "optimizer": ("optimizer", "/")}
 SWARM_NODES = {"swarm": ("swarm", "/")}
 AGENT_NODES = {"swarm_agent": (f"agent_{ROBOT}", "/")}
-CROWD_NODES = {**GROUP_NODES, **SWARM_NODES, **AGENT_NODES}
+ESTIMATOR_NODES = {"estimator": ("estimator", "/")}
+CROWD_NODES = {**GROUP_NODES, **SWARM_NODES, **AGENT_NODES, **ESTIMATOR_NODES}
 
 
 @pytest.fixture(scope="module")
 def graph():
     """Of every node: topics that it hears, topics that it tells, what it serves, what it asks."""
     return {
-        **look(load_scenario("short"), "single", NODES),
+        **look(
+            load_scenario("short").settings("estimator", enabled=True),
+            "single",
+            {**NODES, **ESTIMATOR_NODES},
+        ),
         **look(load_scenario("group-ellipse"), "group", GROUP_NODES),
         **look(load_scenario("swarm-square"), "swarm", SWARM_NODES),
         **look(two_that_decide_for_themselves(), "swarm", AGENT_NODES),
@@ -100,7 +105,7 @@ def look(scenario, system, nodes):
 
 
 def test_every_node_has_a_row_and_no_other():
-    assert {row[0] for row in table("node")[:8]} == {*NODES, *CROWD_NODES}
+    assert {row[0] for row in table("node")[:9]} == {*NODES, *CROWD_NODES}
 
 
 @pytest.mark.parametrize("node", [*NODES, *CROWD_NODES])
