@@ -7,6 +7,7 @@ import numpy as np
 
 from push_model import se2
 from push_model.pushable_sides import pushable_sides
+from push_model.shapes import Side
 from push_model.specs import ObjectSpec, RobotSpec
 from push_model.stable_push import contact_on_side, curvature_limits
 from push_mpc.line_contact import line_contact
@@ -30,17 +31,10 @@ def believed_push(push: Push, robot: RobotSpec, item: ObjectSpec) -> Push:
     Unstable: the straight push would slip or tip over an end of the contact.
     """
     line = line_contact(robot, item, push.grasp)
-    place = se2.compose(push.grasp, se2.pose(*item.com, 0.0))
-    ahead = np.array([robot.push_distance, 0.0, 0.0])
-    nearest, gap = None, math.inf
-    for side in pushable_sides(item.geometry, robot):
-        contact = contact_on_side(side, robot.flat_bumper.width)
-        off = se2.between(contact.object_pose + ahead, place)
-        away = math.hypot(off[0], off[1])
-        if away < min(gap, _SAME_PLACE) and abs(off[2]) < _SAME_HEADING:
-            nearest, gap = contact, away
-    if nearest is None:
+    side = nearest_side(push, robot, item)
+    if side is None:
         return replace(push, line=line)
+    nearest = contact_on_side(side, robot.flat_bumper.width)
     limits = curvature_limits(
         nearest, robot.push_distance, item.contact_friction, item.limit_surface()
     )
@@ -50,3 +44,17 @@ def believed_push(push: Push, robot: RobotSpec, item: ObjectSpec) -> Push:
             "stable"
         )
     return replace(push, limits=limits, line=line)
+
+
+def nearest_side(push: Push, robot: RobotSpec, item: ObjectSpec) -> Side | None:
+    """The side whose nominal contact lies nearest to that of a push; None where it lies at none."""
+    place = se2.compose(push.grasp, se2.pose(*item.com, 0.0))
+    ahead = np.array([robot.push_distance, 0.0, 0.0])
+    nearest, gap = None, math.inf
+    for side in pushable_sides(item.geometry, robot):
+        contact = contact_on_side(side, robot.flat_bumper.width)
+        off = se2.between(contact.object_pose + ahead, place)
+        away = math.hypot(off[0], off[1])
+        if away < min(gap, _SAME_PLACE) and abs(off[2]) < _SAME_HEADING:
+            nearest, gap = side, away
+    return nearest

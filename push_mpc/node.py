@@ -16,6 +16,7 @@ from push_model.belief import POSES
 from push_model.settings import SettingsError
 from push_mpc import Push, Task, Tick, TrackerSettings, TrajectoryTracker, controller_kind
 from push_mpc.believed_push import Unstable, believed_push
+from push_mpc.certified_push import PushCertificate
 from push_mpc.follower_node import Command, Followed, FollowerKind, FollowerNode
 from push_mpc.line_contact import line_contact
 from push_mpc.other_bodies import kept_off
@@ -59,6 +60,7 @@ class VelocityFollower:
         self.bodies: Collection[str] = {robot, *self._scenario.objects, *self._others}
         self._object = ""
         self._told_push: Push | None = None  # as it was planned
+        self._certificate: PushCertificate | None = None
         self._beliefs = BeliefFeed(
             shell, names, self._scenario, diagnostics, lambda belief: self._take_up()
         )
@@ -110,7 +112,10 @@ class VelocityFollower:
         delay = self._tracker_settings.pose_delay
         if (POSES, "latency") in belief.values:
             delay = belief.latency.value
-        push = None
+        push, self._certificate = None, None
+        if told is not None and belief.values:
+            robot = belief.robot(self._robot)
+            self._certificate = PushCertificate(told, robot, belief, self._object)
         if self.tracker.active and told is not None:
             item, robot = belief.object(self._object), belief.robot(self._robot)
             try:
@@ -150,6 +155,7 @@ class VelocityFollower:
     def begin(self, request: Any, task: Task) -> None:
         """See Follower."""
         self._object, self._told_push = request.object, task.push
+        self._certificate = None
         self.tracker.start(task)
         if self._beliefs.current.values:
             self._take_up()
@@ -220,7 +226,13 @@ class VelocityFollower:
         if shell.poses.stamp - self._reported < _REPORTS - 1e-9:
             return
         self._reported = shell.poses.stamp
-        report = tick_report(followed.tick, self._told_push is not None)
+        tick, margin = followed.tick, math.nan
+        if self._certificate is not None:
+            alarmed = bool(self._certificate.alarm)
+            margin = self._certificate.margin(tick.v, tick.omega, tick.object_offset)
+            if self._certificate.alarm and not alarmed:
+                shell.get_logger().warning(self._certificate.alarm)
+        report = tick_report(tick, self._told_push is not None, margin)
         self._reports.publish(report_to_ros(report, shell.stamp, self._controller, self._object))
 
 
