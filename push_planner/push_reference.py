@@ -6,6 +6,7 @@ from itertools import groupby
 
 import numpy as np
 
+from push_model.arrays import Array
 from push_model.kinematics import DifferentialDrive
 from push_model.push_segment import PushSegment
 from push_model.trajectory import Trajectory, along_curve
@@ -24,7 +25,9 @@ def push_reference(
     The speed at each curvature is the greatest that ``push_speed`` and the wheels, less their
     reserve, allow. Where the curvature jumps from one curve to the next, the robot does not stop.
     """
-    points, heading, curvature = [], [], []
+    points: list[Array] = []
+    heading: list[Array] = []
+    curvature: list[Array] = []
     for curve in curves:
         p, h, k = curve.sample(max(_SAMPLES, int(curve.length / _SPACING)))
         first = 1 if points else 0
