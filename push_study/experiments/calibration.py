@@ -77,7 +77,13 @@ def tasks(options: StudyOptions) -> list[CalibrationTask]:
         text = digest(scenario)
         made += [
             CalibrationTask(
-                name, seed, str(options.out), kind, options.uncertainty, options.world, text
+                name,
+                seed,
+                str(options.out),
+                kind,
+                options.uncertainty,
+                options.world or OPTIONS["world"],
+                text,
             )
             for seed in range(options.seed, options.seed + options.trials)
             for kind in KINDS

@@ -149,7 +149,7 @@ def test_rows_written_out_are_the_rows_of_the_outputs():
         assert b - G @ z == pytest.approx(qp.rooms(z)[numbers], abs=1e-12)
 
 
-def tick_programme(random, p=20, obstacles=20):
+def tick_programme(random, p=20, obstacles=20, **limits):
     t = 0.1 * np.arange(p + 1)
     reference = Reference(
         np.column_stack([0.07 * t, 0 * t, 0 * t]), np.tile([0.07, 0.0, 0.0], (p + 1, 1))
@@ -157,16 +157,22 @@ def tick_programme(random, p=20, obstacles=20):
     centres = random.uniform(0, 0.015 * p, (obstacles, 2))
     circles = np.column_stack([centres, np.full(obstacles, 0.045)])
     error = random.normal(size=5) * [0.01, 0.02, 0.2, 0.02, 0.2]
-    settings = MpcSettings(horizon=p, max_obstacles=obstacles)
+    settings = MpcSettings(horizon=p, max_obstacles=obstacles, **limits)
     mpc = LtvMpc(settings, DifferentialDrive(0.0205, 0.0265, 6.28))
     return mpc.programme(error, reference, Contact(CurvatureLimits(-1.8, 1.8)), circles)
+
+
+SLOW = {"max_acceleration": 0.3, "max_acceleration_change": 0.3} | {
+    "max_turn_acceleration": 6.0, "max_turn_acceleration_change": 6.0
+}  # fmt: skip
+"""Limits so narrow that many of them are met."""
 
 
 def test_the_cap_on_iterations_grows_with_the_programme():
     """The longest horizon, from a working set of another world: more than 500 are needed."""
     solver, most = ActiveSetBackend(), 0
     for seed in range(20):
-        qp = tick_programme(np.random.default_rng(seed), 100, 100)
+        qp = tick_programme(np.random.default_rng(seed), 100, 100, **SLOW)
         result = solver.solve(qp)
         assert result.solved, result.status
         most = max(most, int(result.status.split()[-2]))
