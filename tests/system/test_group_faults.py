@@ -72,6 +72,7 @@ def run():
         yield started
 
 
+@pytest.mark.long
 def test_a_reset_of_the_world_ends_the_job_and_the_next_goal_is_reached(run):
     """Row 12."""
     run.teams[""].send_goal(FAR)

@@ -70,7 +70,7 @@ def pushing(run, goal):
     run.spin_until(lambda: False, 1.0)
 
 
-@pytest.mark.parametrize("system", ["swarm", "group"])
+@pytest.mark.parametrize("system", ["swarm", pytest.param("group", marks=pytest.mark.long)])
 def test_the_job_is_taken_up_again_and_ends_at_the_goal(monkeypatch, system):
     goal = np.array(SYSTEMS[system].VALUES["goal"])
     with running(monkeypatch, system) as run:
@@ -118,7 +118,7 @@ def spoilt(run, how):
 @pytest.mark.parametrize(
     ("how", "code"),
     [
-        ("moved", JobError.JOB_FORGOTTEN),
+        pytest.param("moved", JobError.JOB_FORGOTTEN, marks=pytest.mark.long),
         ("reset", JobError.CLOCK_RESET),
         pytest.param("late reset", JobError.CLOCK_RESET, marks=pytest.mark.long),
         pytest.param("died too often", JobError.JOB_FORGOTTEN, marks=pytest.mark.long),
