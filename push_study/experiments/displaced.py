@@ -28,7 +28,7 @@ FAR, TURN = 0.04, 0.12
 """[m], [rad] by which the box is moved at most."""
 POSITION, ORIENTATION = 0.01, 0.05
 """[m], [rad] within which a trial succeeds."""
-_WHEN = (12.0, 30.0)  # [s] of sim time from which on; the first push begins at about 8 s
+_WHEN = (7.0, 18.0)  # [s] of sim time from which on; a push is under way from about 3 s on
 _TRIES = 10_000  # draws of a move
 _PATIENCE = 300.0  # [s] of sim time
 

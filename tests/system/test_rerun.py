@@ -141,7 +141,8 @@ def test_calls_of_services_are_repeated(tmp_path, capsys):
         people.extend((at, kind, node.create_client(kind, name), f) for at, kind, name, f in calls)
         return [node]
 
-    with own_domain(), LockstepRun(load_scenario("short"), extra, quiet=True, record=bag) as run:
+    slow = load_scenario("short").settings("planner", push_speed=0.03)
+    with own_domain(), LockstepRun(slow, extra, quiet=True, record=bag) as run:
         run.start()
         assert run.spin_until(lambda: all(c.service_is_ready() for _, _, c, _ in people), 5.0)
         run.teams[""].send_goal(np.array([0.1, 0.04, 0.1]))
