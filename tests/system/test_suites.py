@@ -63,7 +63,7 @@ def test_a_script_starts_a_suite_and_is_told_how_it_ended(domain, tmp_path, capf
         "positioning",
         "approach",
         "pushing",
-        "detaching",
+        "idle",
     ]
     contents = load(result.bag)
     assert final_error(contents, contents.jobs["/"]).position < 0.02
