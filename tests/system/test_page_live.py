@@ -139,6 +139,7 @@ def test_single_by_everything_that_the_page_offers(page):
     # pause, and go on
     page.click("pause")
     page.until("document.getElementById('trouble').textContent === 'the suite is paused'")
+    time.sleep(0.3)  # a picture that was under way
     still = page.shown_pose("box")
     time.sleep(0.5)
     assert page.shown_pose("box") == still
