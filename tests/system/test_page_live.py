@@ -60,7 +60,15 @@ class Page:
         self.value(EXPOSE)
 
     def pixel(self, x, y):
-        """Where a place [m] is on the page [CSS pixels]; it is scrolled into view."""
+        """Where a place [m] is on the page [CSS pixels], once the page has settled."""
+        before, now = None, self._pixel(x, y)
+        while now != before:
+            time.sleep(0.15)
+            before, now = now, self._pixel(x, y)
+        return now
+
+    def _pixel(self, x, y):
+        """It is scrolled into view."""
         return self.value(
             "(async () => { const c = document.getElementById('scene'); c.scrollIntoView();"
             "await new Promise(requestAnimationFrame);"
