@@ -125,6 +125,8 @@ const tools = {
     up(metres) {
       const i = bodyAt(model, metres);
       if (i !== undefined && model.bodies.types[model.bodies.type[i]].robot) request("kill", {robot: model.bodies.names[i]});
+      else sent = {space: chosen, stamp: "", failed: "there is no robot at this place"};
+      soon();
     },
   },
 };

@@ -68,9 +68,11 @@ class Page:
         return now
 
     def _pixel(self, x, y):
-        """It is scrolled into view."""
+        """It is scrolled into view, no further than needed: what the page shows below the map comes
+        and goes, and a page that is scrolled to its end moves with it."""
         return self.value(
-            "(async () => { const c = document.getElementById('scene'); c.scrollIntoView();"
+            "(async () => { const c = document.getElementById('scene');"
+            "c.scrollIntoView({block: 'nearest'});"
             "await new Promise(requestAnimationFrame);"
             "const {Scene, fitted, toPixels} = await import('/scene.js');"
             "const b = c.getBoundingClientRect(), r = c.width / b.width;"
@@ -172,6 +174,9 @@ def test_single_by_everything_that_the_page_offers(page):
     page.click("reset")
     assert until(lambda: far(page.shown_pose("box"), begun) < 0.002, 5.0)
     page.choose("kill")
+    nobody = page.pixel(0.4, 0.4)
+    page.drag(nobody, nobody)
+    page.until("document.getElementById('answer').textContent.includes('no robot')")
     robot = page.pixel(*page.shown_pose("epuck1")[:2])
     page.drag(robot, robot)
     page.until("document.getElementById('answer').textContent.includes('obeys no more')")
