@@ -124,6 +124,15 @@ def _team(spec: NodeSpec) -> dict[str, Any]:
     }
 
 
+def _robot_and_object(spec: NodeSpec) -> dict[str, Any]:
+    return {
+        "robot": spec.robot,
+        "item": spec.item,
+        "namespace": spec.namespace,
+        "world": spec.world,
+    }
+
+
 def _robot(spec: NodeSpec) -> dict[str, Any]:
     return {"robot": spec.robot, "namespace": spec.world}
 
@@ -181,12 +190,7 @@ KINDS: dict[str, NodeKind] = {
     "supervisor": NodeKind(
         "push_supervisor.node",
         "SupervisorNode",
-        lambda s: {
-            "robot": s.robot,
-            "item": s.item,
-            "namespace": s.namespace,
-            "world": s.world,
-        },
+        _robot_and_object,
         ("world", "robot", "object"),
         {"": SupervisorSettings, **_GATED},
         owner=True,
@@ -243,12 +247,7 @@ KINDS: dict[str, NodeKind] = {
     "estimator": NodeKind(
         "push_ros.estimator_node",
         "EstimatorNode",
-        lambda s: {
-            "robot": s.robot,
-            "item": s.item,
-            "namespace": s.namespace,
-            "world": s.world,
-        },
+        _robot_and_object,
         ("world", "robot", "object"),
         {"": EstimatorSettings, "push": PushPriorSettings, "latency": LatencySettings, **_GATED},
         listens=1,

@@ -6,10 +6,11 @@ would have slipped; one that slides or pivots tells the values themselves.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from push_estimation.evidence import Contradiction, Verdict, log_mean, log_total
 from push_estimation.line_push_model import Bumper, Candidates, followed
 from push_estimation.push_windows import Window
 from push_estimation.pushed_side import Facing
@@ -25,7 +26,6 @@ _FLUSH = 0.012  # [rad] up to which a contact is taken as flush
 _OUTLIER = 0.02  # share of windows that anything may have happened in
 _OUTLYING = (0.03, 0.3)  # [m/s], [rad/s] of such windows
 _STRANGE = 25.0  # squared deviation of the best cell above which a window is not a push
-_CONTRADICTED = 7.0  # log of the odds of prior against posterior at which the interval is widened
 _BESIDE = 1.5  # friction of the file, and what may be true beside it
 _INSIDE = 0.8  # of the distance to the nearest side: where the centre of mass may be
 _EVERY = 7  # cell of the prior that a window is always compared with
@@ -91,16 +91,6 @@ class PushPriorSettings:
             )
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """What a window did. used: whether it counts. contradicted: whether the interval was widened.
-    sentence: what there is to tell of it; empty for an ordinary window."""
-
-    used: bool
-    contradicted: bool = False
-    sentence: str = ""
-
-
 class PushBelief:
     """The joint probability of contact friction and centre of mass of one object.
 
@@ -143,7 +133,7 @@ class PushBelief:
     def reset(self) -> None:
         """Know the prior only."""
         self._log = self._start.copy()
-        self._odds = 0.0
+        self._contradiction = Contradiction()
 
     def take(self, window: Window) -> Verdict:
         """Use a window."""
@@ -160,10 +150,9 @@ class PushBelief:
                 "range explains; something else touches it, or its poses are wrong",
             )
         every = self._sample
-        expected = _average(self._start[every], density[every]) - _average(self._log, density)
-        self._odds = max(0.0, self._odds + expected)
+        by_prior = log_mean(self._start[every], density[every])
         self.windows += 1
-        if self._odds > _CONTRADICTED:
+        if self._contradiction.add(by_prior, log_mean(self._log, density)):
             self.reset()
             self.widened += 1
             return Verdict(
@@ -181,7 +170,7 @@ class PushBelief:
 
     def _multiply(self, density: Array) -> None:
         log = self._log + self._prior.weight * density
-        self._log = log - _total(log)
+        self._log = log - log_total(log)
 
     def _flush(self, window: Window) -> bool:
         """Whether the contact is flush at the beginning, as far as the noise allows to say."""
@@ -270,16 +259,6 @@ def _interval(edges: Array, share: Array, share_more: float, more: float) -> Int
     low = max(float(edges[0]), (low - float(cell[first]) / 2.0) * (1.0 - share_more) - more)
     high = min(float(edges[-1]), (high + float(cell[last]) / 2.0) * (1.0 + share_more) + more)
     return Interval(value, low, high)
-
-
-def _average(log: Array, density: Array) -> float:
-    """Log of the mean of a density under a distribution."""
-    return _total(log + density) - _total(log)
-
-
-def _total(log: Array) -> float:
-    most = float(log.max())
-    return most + float(np.log(np.exp(log - most).sum()))
 
 
 def _depth(item: ObjectSpec) -> float:

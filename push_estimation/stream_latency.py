@@ -9,10 +9,10 @@ nothing about the delay; slip of the wheels that is steady goes into the drift.
 
 import math
 from bisect import bisect_left
-from dataclasses import dataclass
 
 import numpy as np
 
+from push_estimation.evidence import Contradiction, Verdict, log_mean, log_total
 from push_model.arrays import Array
 from push_model.belief import Interval
 from push_model.settings import SettingsError, bounded, settings
@@ -25,7 +25,6 @@ _SMALL = (1e-3, 6e-3)  # [m], [rad] root mean square that may be missing beside 
 _PLAIN = 0.05  # of the scatter's square: that of the motion below which a window tells nothing
 _STALE = 2000  # commands that are kept at least
 _OUTLIER = 0.01  # share of windows that anything may have happened in
-_CONTRADICTED = 7.0  # log of the odds of prior against posterior at which the interval is widened
 
 
 @settings
@@ -61,16 +60,6 @@ class LatencySettings:
             raise SettingsError(f"low {self.low} must be below high {self.high} by two steps")
 
 
-@dataclass(frozen=True)
-class LatencyVerdict:
-    """What a window did. used: whether it counts. contradicted: whether the interval was widened.
-    sentence: what there is to tell of it; empty for an ordinary window."""
-
-    used: bool
-    contradicted: bool = False
-    sentence: str = ""
-
-
 class StreamLatency:
     """The probability of the latency, on a grid.
 
@@ -87,9 +76,12 @@ class StreamLatency:
 
     def reset(self) -> None:
         """Know the prior only, and forget commands and poses."""
-        self._log = np.zeros(len(self._grid))
-        self._odds = 0.0
+        self._start_anew()
         self.forget()
+
+    def _start_anew(self) -> None:
+        self._log = np.zeros(len(self._grid))
+        self._contradiction = Contradiction()
 
     def forget(self) -> None:
         """Forget commands and poses, not what was learned."""
@@ -121,7 +113,7 @@ class StreamLatency:
         if len(self._stamps) > 2 * _STALE:
             del self._stamps[:_STALE], self._sums[:_STALE]
 
-    def pose(self, stamp: float, pose: Array) -> LatencyVerdict | None:
+    def pose(self, stamp: float, pose: Array) -> Verdict | None:
         """A pose ``(3,)`` of the robot and its stamp [s]; a verdict when a window is complete."""
         if not (math.isfinite(stamp) and np.isfinite(pose).all()):
             self._frames.clear()
@@ -151,7 +143,7 @@ class StreamLatency:
         low, high = max(s.low, float(low) - s.floor), min(s.high, float(high) + s.floor)
         return Interval(float(value), low, high)
 
-    def _use(self, frames: list[tuple[float, Array]]) -> LatencyVerdict | None:
+    def _use(self, frames: list[tuple[float, Array]]) -> Verdict | None:
         t = np.array([f[0] for f in frames])
         s, newest = self._settings, self._stamps[-1] if self._stamps else -math.inf
         oldest = self._stamps[0] if self._stamps else math.inf
@@ -194,7 +186,7 @@ class StreamLatency:
             log -= 0.5 * free * np.log(np.maximum(errors, 1e-3 * float(errors.max())))
         if strange:
             self.strange += 1
-            return LatencyVerdict(
+            return Verdict(
                 False,
                 sentence="the robot does not move as it is commanded; it may be blocked, or "
                 "its pose is wrong",
@@ -203,18 +195,17 @@ class StreamLatency:
             return None
         return self._multiply(log)
 
-    def _multiply(self, log: Array) -> LatencyVerdict:
-        log = log - _total(log)  # of a uniform prior, each window is a distribution
+    def _multiply(self, log: Array) -> Verdict:
+        log = log - log_total(log)  # of a uniform prior, each window is a distribution
         log = np.logaddexp(
             math.log1p(-_OUTLIER) + self._settings.weight * log, math.log(_OUTLIER / len(log))
         )
-        prior = _total(log) - math.log(len(log))
-        self._odds = max(0.0, self._odds + prior - (_total(self._log + log) - _total(self._log)))
+        by_prior = log_mean(np.zeros(len(log)), log)
         self.windows += 1
-        if self._odds > _CONTRADICTED:
-            self._log, self._odds = np.zeros(len(self._grid)), 0.0
+        if self._contradiction.add(by_prior, log_mean(self._log, log)):
+            self._start_anew()
             self.widened += 1
-            return LatencyVerdict(
+            return Verdict(
                 True,
                 True,
                 "the latest motion contradicts the latency that was believed; the interval is that "
@@ -222,7 +213,7 @@ class StreamLatency:
             )
         self._log = self._log + log
         self._log -= self._log.max()
-        return LatencyVerdict(True)
+        return Verdict(True)
 
     def _commanded(self, t: Array) -> Array:
         """``(delays, n, 2)`` what had been commanded [m], [rad] until times ``(n,)``, by delay."""
@@ -234,8 +225,3 @@ class StreamLatency:
         at = t[None, :] - self._grid[:, None] - self._settings.actuation_lag
         columns = [np.interp(at.ravel(), stamps, sums[:, k]).reshape(at.shape) for k in (0, 1)]
         return np.stack(columns, axis=-1)
-
-
-def _total(log: Array) -> float:
-    most = float(log.max())
-    return most + math.log(float(np.exp(log - most).sum()))
