@@ -256,6 +256,18 @@ def holds_obstacle(field: Any, points: Any, pose: Any, ox: float, oy: float, sca
 
 
 @numba.njit(cache=True, fastmath=True)
+def _clearances(field: Any, poses: Any, points: Any, ox: float, oy: float, scale: float) -> Any:
+    """Least clearance of a closed outline at each of the poses (n, 3); 0 on overlap."""
+    result = np.zeros(poses.shape[0])
+    for i in range(poses.shape[0]):
+        x, y, theta = poses[i, 0], poses[i, 1], poses[i, 2]
+        clearance = points_clearance(field, points, x, y, theta, ox, oy, scale)
+        if clearance > 0.0 and not holds_obstacle(field, points, poses[i], ox, oy, scale):
+            result[i] = clearance
+    return result
+
+
+@numba.njit(cache=True, fastmath=True)
 def _segment_clearance(
     field: Any, u0: float, v0: float, u1: float, v1: float, enough: float
 ) -> float:
@@ -308,6 +320,11 @@ class DistanceField:
         if holds_obstacle(self.values, outline, pose, *self.args):
             return 0.0
         return float(points_clearance(self.values, outline, pose[0], pose[1], pose[2], *self.args))
+
+    def clearances(self, outline: Array, poses: Array) -> Array:
+        """``(n,)`` [m] of a body with a closed outline at poses ``(n, 3)``; 0 on overlap."""
+        result: Array = _clearances(self.values, poses, outline, *self.args)
+        return result
 
     def segment(
         self, start: Sequence[float] | Array, end: Sequence[float] | Array, enough: float = -1.0

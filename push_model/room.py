@@ -107,6 +107,16 @@ def segment_keeps(
 
 
 @numba.njit(cache=True)
+def chain_keeps(field: Any, capsules: Any, body: float, ends: Any, need: float, chain: Any) -> bool:
+    """Whether all segments between successive points ``(n, 2)`` surely have the room they need."""
+    for k in range(chain.shape[0] - 1):
+        u0, v0, u1, v1 = chain[k, 0], chain[k, 1], chain[k + 1, 0], chain[k + 1, 1]
+        if not segment_keeps(field, capsules, body, ends, need, u0, v0, u1, v1):
+            return False
+    return True
+
+
+@numba.njit(cache=True)
 def straightened(
     field: Any, capsules: Any, body: float, ends: Any, need: float, points: Any
 ) -> Any:

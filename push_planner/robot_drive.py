@@ -23,6 +23,8 @@ from push_planner.settings import PlannerSettings
 
 Keeps = Callable[[Array, float], bool]
 """Whether a chain of chords ``(n, 2)`` [m] keeps the distances, and a margin [m] more."""
+Room = Callable[[Array], float]
+"""[m] least distance of the robot's outline to obstacles over poses ``(n, 3)``."""
 
 _SHARP = 1.4  # [rad] corners that turn more are turned at in place
 _SPACING = 0.005  # [m] of points on a curve
@@ -30,6 +32,7 @@ _TURN = 0.1  # [rad] between them, about
 _POINTS = 8  # on a curve, at least
 _SHORT = 2e-3  # [m] legs that are not worth a motion
 _STILL = 1e-3  # [rad] turns likewise
+_ALIKE = 1e-3  # [m] that one motion may come nearer to obstacles than another that is slower
 
 
 class _Curves:
@@ -127,6 +130,7 @@ def fastest_drive(
     keeps: Keeps,
     drive: DifferentialDrive,
     settings: PlannerSettings,
+    room: Room | None = None,
 ) -> Trajectory:
     """The fastest motion along a way: ahead or astern, with curved ends or turns in place there.
 
@@ -135,6 +139,9 @@ def fastest_drive(
     corners: ``(n, 2)`` of the way, from the start to the goal; its straight legs are free.
     start, goal: ``(3,)`` poses.
     keeps: the check of curves.
+    room: given where an end of the way is nearer to an obstacle than the safety distance. There a
+        bumper that turns may come much nearer than the disc around the robot tells, so that only
+        motions are considered which keep the safety distance, or as much of it as any does.
     """
     corners = _without_short_legs(corners)
     if len(corners) < 2:
@@ -150,6 +157,10 @@ def fastest_drive(
         for piece in curves.pieces():
             motion.along(*piece, astern)
         ways.append(motion.end(goal))
+    if room is not None:
+        kept = [min(room(way.pose), settings.safety_distance) for way in ways]
+        wanted = max(kept) - _ALIKE
+        ways = [way for way, has in zip(ways, kept, strict=True) if has >= wanted]
     return min(ways, key=lambda way: way.duration)
 
 

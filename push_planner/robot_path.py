@@ -1,19 +1,23 @@
 """A way for the robot alone between two poses."""
 
-import itertools
 from enum import IntEnum
 
 import numpy as np
 
+from push_model import se2
 from push_model.arrays import Array
 from push_model.disc_way import disc_way, reliefs
 from push_model.distance_field import DistanceField
 from push_model.obstacles import disc_capsules, scaled_capsules
-from push_model.room import room_at, segment_keeps
+from push_model.outlines import distance, inside
+from push_model.room import chain_keeps, room_at
+from push_model.shapes import densified
 from push_model.specs import RobotSpec
 from push_model.trajectory import Trajectory
-from push_planner.robot_drive import fastest_drive
+from push_planner.robot_drive import Room, fastest_drive
 from push_planner.settings import PlannerSettings
+
+_OUTLINE_SPACING = 0.01  # [m] of points between which distances are interpolated
 
 
 class RobotPathError(IntEnum):
@@ -86,9 +90,29 @@ def plan_robot_path(
     def keeps(chords: Array, margin: float) -> bool:
         at = (chords - field.args[:2]) * field.args[2]
         wanted = need + margin * field.args[2]
-        return all(
-            segment_keeps(field.values, capsules, body, ends, wanted, *a, *b)
-            for a, b in itertools.pairwise(at)
-        )
+        return bool(chain_keeps(field.values, capsules, body, ends, wanted, at))
 
-    return fastest_drive(points, start, goal, keeps, robot.differential, settings)
+    tight = bool(ends[:, 2].any())
+    room = _outline_room(field, robot, circles) if tight else None
+    return fastest_drive(points, start, goal, keeps, robot.differential, settings, room)
+
+
+def _outline_room(field: DistanceField, robot: RobotSpec, circles: Array) -> Room:
+    """The least distance [m] of the robot's outline to the map and the circles over a motion."""
+    outline = densified(robot.outline, _OUTLINE_SPACING)
+    reach = float(np.hypot(*outline.T).max())
+    beside = circles[:, 2] - robot.footprint_radius  # [m] that the outline is to stay off
+
+    def room(poses: Array) -> float:
+        least = float(field.clearances(outline, poses).min())
+        for (x, y, _), keep in zip(circles, beside, strict=True):
+            away = poses[np.hypot(poses[:, 0] - x, poses[:, 1] - y) < least + keep + reach]
+            if len(away):
+                seen = np.array(
+                    [se2.transform(se2.inverse(p), np.array([[x, y]]))[0] for p in away]
+                )
+                gap = distance(robot.outline, seen) * np.where(inside(robot.outline, seen), -1.0, 1)
+                least = min(least, float(gap.min()) - keep)
+        return least
+
+    return room

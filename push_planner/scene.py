@@ -8,13 +8,12 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from push_model import se2
 from push_model.arrays import Array
-from push_model.distance_field import DistanceField, holds_obstacle, points_clearance
+from push_model.distance_field import DistanceField
 from push_model.pushable_sides import pushable_sides
 from push_model.shapes import densified
 from push_model.specs import ObjectSpec, RobotSpec
@@ -34,18 +33,6 @@ _LEAST = 0.003  # [m] that the robot keeps even then
 _APART = 0.005  # [m] between poses of the robot that are looked at by themselves
 _CLOSE = 0.5  # of the stand-off, where there is no room for all of it
 _TURNING = 0.25  # of the safety distance that it keeps where it turns, before a push
-
-
-@numba.njit(cache=True, fastmath=True)
-def _clearances(field: Any, poses: Any, points: Any, ox: float, oy: float, scale: float) -> Any:
-    """Least clearance of a closed outline at each of the poses (n, 3); 0 on overlap."""
-    result = np.zeros(poses.shape[0])
-    for i in range(poses.shape[0]):
-        x, y, theta = poses[i, 0], poses[i, 1], poses[i, 2]
-        clearance = points_clearance(field, points, x, y, theta, ox, oy, scale)
-        if clearance > 0.0 and not holds_obstacle(field, points, poses[i], ox, oy, scale):
-            result[i] = clearance
-    return result
 
 
 @dataclass(frozen=True)
@@ -129,8 +116,7 @@ class PushScene:
 
     def object_clearances(self, poses: Array) -> Array:
         """[m] ``(n,)`` of the object at poses ``(n, 3)``; 0 where it overlaps an obstacle."""
-        values: Array = _clearances(self.field.values, poses, self._object_points, *self.field.args)
-        return values
+        return self.field.clearances(self._object_points, poses)
 
     @property
     def sweep_arguments(self) -> tuple[Any, ...]:

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 from scipy.ndimage import label
 
+from push_model import se2
 from push_model.distance_field import DistanceField
 from push_model.occupancy import rasterise
+from push_model.shapes import densified
 from push_model.specs import BoxSpec, EnvironmentSpec
 from push_planner import NoRobotPath, PlannerSettings, RobotPathError, plan_robot_path
 from tests.push_planner.exact_geometry import points_distance, random_world
@@ -71,6 +73,53 @@ def test_the_way_keeps_its_distance_away_from_tight_ends(robot):
             assert gap[short].max() < 0.15, (number, gap[short].max())
     print(f"found {found} tight {tight} refused {refused}")
     assert found > 120 and tight > 40
+
+
+def test_where_an_end_is_tight_the_bumper_keeps_off_as_far_as_any_motion_lets_it(
+    robot, monkeypatch
+):
+    """400 worlds: against the fastest motion, which looks at the disc around the robot only."""
+    random = np.random.default_rng(2)
+    radius, slack = robot.footprint_radius, robot.footprint_radius - robot.body_radius
+    outline = densified(robot.outline, 0.005)
+
+    def kept(field, circles, way):
+        """[m] of the outline; by its points, so up to 2.5 mm too much beside a circle."""
+        least = field.clearances(outline, way.pose).min()
+        for x, y, wanted in circles:
+            points = np.concatenate([se2.transform(pose, outline) for pose in way.pose])
+            least = min(least, np.hypot(*(points - (x, y)).T).min() - (wanted - radius))
+        return least
+
+    chosen, fastest = [], []
+    for number in range(400):
+        world = random_world(random, number % 9, size=(2.0, 1.6))
+        field = DistanceField(rasterise(world))
+        circles = np.column_stack(
+            [random.uniform([-1.0, -0.8], [1.0, 0.8], (number % 4, 2)), np.full(number % 4, 0.13)]
+        )
+        spots = random.uniform([-0.95, -0.75], [0.95, 0.75], (400, 2))
+        spare = room(world, circles, radius, spots)
+        tight = spots[(spare > -0.5 * slack) & (spare < 0.008)]
+        if len(tight) < 2:
+            continue
+        ends = [np.array([*spot, random.uniform(-3, 3)]) for spot in tight[:2]]
+        if min(field.clearance(outline, end) for end in ends) <= 0.003:
+            continue
+        try:
+            way = plan_robot_path(field, robot, SETTINGS, *ends, circles)
+        except NoRobotPath:
+            continue
+        with monkeypatch.context() as patch:
+            patch.setattr("push_planner.robot_path._outline_room", lambda *_: None)
+            blind = plan_robot_path(field, robot, SETTINGS, *ends, circles)
+        chosen.append(min(kept(field, circles, way), SETTINGS.safety_distance))
+        fastest.append(min(kept(field, circles, blind), SETTINGS.safety_distance))
+    chosen, fastest = np.array(chosen), np.array(fastest)
+    print(f"{len(chosen)}: {(chosen < 3e-3).sum()} below 3 mm, fastest {(fastest < 3e-3).sum()}")
+    assert len(chosen) > 120
+    assert (chosen > fastest - 5e-3).all()
+    assert (chosen < 3e-3).sum() < 0.85 * (fastest < 3e-3).sum()
 
 
 def test_no_detour_and_none_through_a_robot(robot):
