@@ -8,7 +8,9 @@ import numpy as np
 
 from push_model.arrays import Array
 from push_model.drives import HolonomicDrive
+from push_model.outlines import inset
 from push_model.settings import SettingsError
+from push_model.shape_specs import PolygonShape
 from push_model.specs import ObjectSpec, RobotSpec
 from push_scenario.scenario import Scenario
 from push_study.pool import Row
@@ -25,7 +27,9 @@ class Uncertainty:
     distribution in a trial. believed_latency: [s] what the controller makes good, the drawn one
     when None. spread: relative, of frictions. contact_friction, robot_friction: of robot on object
     and of robot on robot; drawn from these ranges instead, where given. com: [m] up to which the
-    centre of mass is off. own_draws: other ones for each scenario.
+    centre of mass is off. outline: [m] up to which all sides of an object lie farther out, or in,
+    than is believed. dropout: share of the frames of each body that are lost. estimated: whether
+    the estimator of a robot that pushes alone is on. own_draws: other ones for each scenario.
     """
 
     position_noise: float = 2e-4
@@ -38,6 +42,9 @@ class Uncertainty:
     contact_friction: Range | None = None
     robot_friction: Range | None = None
     com: float = 0.0
+    outline: float = 0.0
+    dropout: float = 0.0
+    estimated: bool = False
     own_draws: bool = False
 
     def draw(self, believed: Scenario, seed: int) -> tuple[Scenario, Scenario, Row]:
@@ -60,8 +67,11 @@ class Uncertainty:
             motion_capture__rate=self.rate,
             motion_capture__latency=latency,
             motion_capture__latency_jitter=self.latency_jitter,
+            motion_capture__dropout=self.dropout,
         ).settings("controller", tracker__pose_delay=known)
         believed = believed.settings("group", control__pose_delay=known)
+        if self.estimated:
+            believed = believed.settings("estimator", enabled=True)
         drawn: Row = {} if low == high else {"latency_s": latency}
         objects = {}
         for name, (item, start) in believed.objects.items():
@@ -91,6 +101,11 @@ class Uncertainty:
             x, y = item.com[0] + away * np.cos(angle), item.com[1] + away * np.sin(angle)
             changed = replace(changed, com=(float(x), float(y)))
             drawn[f"{name}_com_x_m"], drawn[f"{name}_com_y_m"] = float(x), float(y)
+        if self.outline > 0.0:
+            out = float(random.uniform(-self.outline, self.outline))
+            corners = tuple((float(x), float(y)) for x, y in inset(item.outline, -out))
+            changed = replace(changed, shape=PolygonShape(vertices=corners))
+            drawn[f"{name}_outline_m"] = out
         return changed
 
     def draw_robot(
@@ -144,6 +159,22 @@ UNCERTAINTIES = {
         contact_friction=(0.1, 0.4),
         robot_friction=(0.2, 1.0),
         com=0.01,
+        own_draws=True,
+    ),
+    # Nothing is told but the poses, with lost frames among them, and an outline to 5 mm.
+    "unknown": Uncertainty(
+        position_noise=1e-3,
+        orientation_noise=float(np.deg2rad(0.5)),
+        rate=60.0,
+        latency=(0.02, 0.1),
+        latency_jitter=0.01,
+        believed_latency=0.04,
+        contact_friction=(0.08, 0.5),
+        robot_friction=(0.2, 1.0),
+        com=0.015,
+        outline=0.005,
+        dropout=0.01,
+        estimated=True,
         own_draws=True,
     ),
 }

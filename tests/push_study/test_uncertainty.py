@@ -37,6 +37,20 @@ def test_hard_draws_fill_their_ranges_and_nobody_believes_them():
         assert capture["orientation_noise"] == pytest.approx(0.5 * np.pi / 180)
 
 
+def test_unknown_draws_the_outline_too_and_only_the_estimator_may_find_it_out():
+    rows = drawn("unknown")
+    out = np.array([r["box_outline_m"] for _, _, r in rows])
+    mu = np.array([r["box_contact_friction"] for _, _, r in rows])
+    assert -0.005 <= out.min() < -0.0047 and 0.0047 < out.max() <= 0.005
+    assert 0.08 <= mu.min() < 0.09 and 0.48 < mu.max() <= 0.5
+    for believed, world, row in rows[:20]:
+        assert believed.object()[1] == load_scenario("short").object()[1]
+        real = world.object()[1].outline
+        assert np.abs(real).max() == pytest.approx(0.045 + row["box_outline_m"], abs=1e-6)
+        assert believed.parameters["estimator"]["enabled"] is True
+        assert believed.parameters["bridge"]["motion_capture"]["dropout"] == 0.01
+
+
 def test_own_draws_for_each_scenario_only_where_they_are_hard():
     def friction(level, name):
         return drawn(level, name, [3])[0][2]["box_contact_friction"]
