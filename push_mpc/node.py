@@ -61,6 +61,7 @@ class VelocityFollower:
         self._object = ""
         self._told_push: Push | None = None  # as it was planned
         self._certificate: PushCertificate | None = None
+        self._alarmed = False  # in this push
         self._beliefs = BeliefFeed(
             shell, names, self._scenario, diagnostics, lambda belief: self._take_up()
         )
@@ -155,7 +156,7 @@ class VelocityFollower:
     def begin(self, request: Any, task: Task) -> None:
         """See Follower."""
         self._object, self._told_push = request.object, task.push
-        self._certificate = None
+        self._certificate, self._alarmed = None, False
         self.tracker.start(task)
         if self._beliefs.current.values:
             self._take_up()
@@ -228,9 +229,9 @@ class VelocityFollower:
         self._reported = shell.poses.stamp
         tick, margin = followed.tick, math.nan
         if self._certificate is not None:
-            alarmed = bool(self._certificate.alarm)
             margin = self._certificate.margin(tick.v, tick.omega, tick.object_offset)
-            if self._certificate.alarm and not alarmed:
+            if self._certificate.alarm and not self._alarmed:
+                self._alarmed = True
                 shell.get_logger().warning(self._certificate.alarm)
         report = tick_report(tick, self._told_push is not None, margin)
         self._reports.publish(report_to_ros(report, shell.stamp, self._controller, self._object))

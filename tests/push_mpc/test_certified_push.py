@@ -42,10 +42,13 @@ def test_the_margin_is_that_of_the_least_friction_and_the_alarm_names_it(robot, 
     assert certificate.limits == weaker
     assert certificate.margin(0.1, 0.0, 0.0) == pytest.approx(0.1 * weaker.maximum)
     assert not certificate.alarm
-    tight = 0.9 * push.limits.maximum  # as planned, stable for the friction of the file
+    tight = 0.9 * push.limits.maximum  # stable for the value, but not for the whole interval
     assert certificate.margin(0.1, 0.1 * tight, 0.0) < 0.0
+    assert not certificate.alarm
+    certificate.margin(0.1, 0.1 * 1.1 * push.limits.maximum, 0.0)
     assert certificate.alarm == (
-        "the object may slip on this push: the friction of 'box' is believed between 0.1 and 0.3"
+        "the object is expected to slip: the friction of 'box' is believed to be 0.2, between 0.1 "
+        "and 0.3"
     )
     assert math.isnan(certificate.margin(0.0, 0.1, 0.0)), "it stands"
 
