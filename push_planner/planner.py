@@ -143,8 +143,12 @@ class PushPlanner:
         straight = float(np.hypot(*(item.mass_pose(goal) - item.mass_pose(start))[:2]))
         return straight / float(max(fastest, 1.0)) + self.settings.push_cost
 
-    def plan(self, start: Array, goal: Array, seed: int | None = None) -> Iterator[Progress]:
+    def plan(
+        self, start: Array, goal: Array, seed: int | None = None, thorough: bool = True
+    ) -> Iterator[Progress]:
         """Plan in small slices: each ``next`` does a little work and reports.
+
+        thorough: whether a long search follows where the others find no plan.
 
         The last report carries the best plan, and a plan that is reported never costs more than
         one before it. The work is counted, never timed, so that equal inputs and seeds give equal
@@ -171,17 +175,20 @@ class PushPlanner:
             yield from self._as_printed(ends, min(guides.all(), key=lambda g: g.cost), work)
             return
         best: PushPlan | None = None
-        for progress in self._first_plan(ends, guides, work):
+        for progress in self._first_plan(ends, guides, work, thorough):
             best = progress.best
             yield progress
         if best is None:
             raise self._refusal(ends, guides.all(), work)
         yield from self._improved(best, ends, guides, work)
 
-    def _first_plan(self, ends: _Ends, guides: _Guides, work: _Work) -> Iterator[Progress]:
+    def _first_plan(
+        self, ends: _Ends, guides: _Guides, work: _Work, thorough: bool
+    ) -> Iterator[Progress]:
         """Search among more and more poses, until there is a plan."""
         settings = self.settings
         start, goal = (self.scene.item.mass_pose(pose) for pose in ends)
+        unfinished: tuple[PushGraph, GuidePath] | None = None
         for attempt, count in enumerate(settings.scattered_poses):
             guide = guides.number(attempt)
             yield Progress("guide path", None)
@@ -205,6 +212,19 @@ class PushPlanner:
                     return
                 if search.exhausted:
                     break
+            else:
+                unfinished = graph, guide
+        if unfinished is None or not thorough:
+            return
+        # Pushes that were tried cost nothing now: nearly all of the effort is new.
+        graph, guide = unfinished
+        search = PushSearch(graph, np.inf, settings.heuristic_weight, work.left)
+        for _ in search.run(work.statistics):
+            yield Progress("long push search", None)
+        work.left -= search.expanded
+        work.ways_in |= graph.arrivals > 0
+        if search.solution is not None:
+            yield Progress("improving", self._assemble(search, ends[1], guide, work))
 
     def _improved(
         self, best: PushPlan, ends: _Ends, guides: _Guides, work: _Work

@@ -82,7 +82,7 @@ def plan_after_preemptive_push(
         rest: PushPlan | None = None
         whole: PushPlan | None = None
         try:
-            for progress in planner.plan(offer.object_end, goal):
+            for progress in planner.plan(offer.object_end, goal, thorough=False):
                 if progress.best is not None and progress.best is not rest:
                     rest = progress.best
                     whole = _preceded(planner, offer, rest)

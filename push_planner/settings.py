@@ -77,10 +77,11 @@ class PlannerSettings:
         1200, low=1, high=10000000, doc="Maximum number of pushes that one search evaluates"
     )
     total_expansions: int = bounded(
-        7200,
+        30000,
         low=1,
         high=10000000,
-        doc="Maximum number of pushes that are evaluated until a first plan is found",
+        doc="Maximum number of pushes that are evaluated until a first plan is found. What the "
+        "searches with max_expansions leave of it is for a last, long one",
     )
     improvement_expansions: int = bounded(
         1500,
