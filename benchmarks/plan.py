@@ -23,7 +23,8 @@ from push_model.occupancy import rasterise
 from push_model.specs import BoxSpec, CircleSpec, EnvironmentSpec
 from push_planner import PlannerSettings, PlanningFailed, PushPlanner
 from push_planner.candidate_poses import Candidates, runs
-from push_planner.push_search import PushGraph, PushSearch, SearchStatistics
+from push_planner.push_graph import PushGraph, SearchStatistics
+from push_planner.push_search import PushSearch
 from push_scenario.scenario import load_scenario, scenario_names
 
 PROBLEMS, WORLDS, SEED = 110, 4, 1

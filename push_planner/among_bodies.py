@@ -15,7 +15,12 @@ class TooHeavy(Exception):
 
 
 def plan_among_bodies(
-    planner: PushPlanner, start: Array, goal: Array, circles: Array, preemptive: int = 0
+    planner: PushPlanner,
+    start: Array,
+    goal: Array,
+    circles: Array,
+    preemptive: int = 0,
+    robot: Array | None = None,
 ) -> Iterator[Progress]:
     """The work on a request, in slices as of ``PushPlanner.plan``.
 
@@ -25,6 +30,8 @@ def plan_among_bodies(
     circles: ``(n, 3)`` [m] x, y, radius of other bodies.
     preemptive: 0 for a direct plan; else the number of this request for a pre-emptive push, since
         each draws others.
+    robot: pose ``(3,)`` of the robot, from which it must have a way to the first side; None if
+        unknown.
 
     Raises
     ------
@@ -39,5 +46,5 @@ def plan_among_bodies(
         grid = with_bodies(scene.field.grid, circles, scene.item.outline, start, margin)
         planner = PushPlanner(settings, grid, scene.robot, scene.item)
     if preemptive:
-        return plan_after_preemptive_push(planner, start, goal, settings.seed + preemptive)
-    return planner.plan(start, goal)
+        return plan_after_preemptive_push(planner, start, goal, settings.seed + preemptive, robot)
+    return planner.plan(start, goal, robot=robot)

@@ -170,7 +170,9 @@ class PlannerNode(Node):
             self._pending = self._grid is None
             if self._pending:
                 return  # until the map comes, or the watchdog loses patience
-            for stamped in (request.start, request.goal):
+            for stamped in (request.start, request.goal, request.robot_pose):
+                if stamped is request.robot_pose and not stamped.header.frame_id:
+                    continue
                 if stamped.header.frame_id != FRAME:
                     self._fail(
                         PlanPush.Result.UNKNOWN_FRAME,
@@ -179,7 +181,9 @@ class PlannerNode(Node):
                     return
             start = planar_pose(request.start.pose, "the start")
             goal = planar_pose(request.goal.pose, "the goal")
-            self._work = self._plan(request, start, goal)
+            here = request.robot_pose
+            robot = planar_pose(here.pose, "the robot's pose") if here.header.frame_id else None
+            self._work = self._plan(request, start, goal, robot)
             self._continue()
         except TooHeavy as error:
             self._fail(PlanPush.Result.TOO_HEAVY, str(error))
@@ -190,7 +194,9 @@ class PlannerNode(Node):
         except PlanningFailed as error:
             self._fail(int(error.code), str(error))
 
-    def _plan(self, request: Any, start: Array, goal: Array) -> Iterator[Progress]:
+    def _plan(
+        self, request: Any, start: Array, goal: Array, robot: Array | None
+    ) -> Iterator[Progress]:
         """The work on a request, in slices.
 
         Raises
@@ -206,7 +212,8 @@ class PlannerNode(Node):
             raise InvalidMessage(f"unknown mode {request.mode}; expected DIRECT or PREEMPTIVE")
         preemptive = request.mode == PlanPush.Goal.PREEMPTIVE
         self._draws += preemptive
-        return plan_among_bodies(planner, start, goal, circles, self._draws * preemptive)
+        draw = self._draws * preemptive
+        return plan_among_bodies(planner, start, goal, circles, draw, robot)
 
     def _continue(self) -> None:
         """Queue the next slice behind whatever else the executor has to do."""

@@ -14,6 +14,7 @@ from push_model.specs import ObjectSpec, RobotSpec
 from push_planner.candidate_poses import along_guide, manoeuvres, nearby, runs, scattered
 from push_planner.guide_path import GuidePath, NoGuidePath, guide_paths, origin_floor
 from push_planner.narrow_way import lined_up
+from push_planner.push_graph import PushGraph, PushStep, SearchStatistics
 from push_planner.push_plan import (
     PlanError,
     PlanningFailed,
@@ -22,7 +23,7 @@ from push_planner.push_plan import (
     PushPlan,
 )
 from push_planner.push_reference import push_reference
-from push_planner.push_search import PushGraph, PushSearch, PushStep, SearchStatistics
+from push_planner.push_search import PushSearch
 from push_planner.refusal import check_pose, check_room, why_not
 from push_planner.scene import PushScene
 from push_planner.settings import PlannerSettings
@@ -39,8 +40,8 @@ _REACH = (10.0, 3.0)  # waypoints that a push leads on at most: of the settings;
 class _Work:
     """What has been spent on one plan, and what is left."""
 
-    def __init__(self, settings: PlannerSettings, seed: int) -> None:
-        self.seed = seed
+    def __init__(self, settings: PlannerSettings, seed: int, robot: Array | None) -> None:
+        self.seed, self.robot = seed, robot
         self.random = np.random.default_rng(seed)
         self.statistics = SearchStatistics()
         self.iterations = self.poses = 0
@@ -144,11 +145,17 @@ class PushPlanner:
         return straight / float(max(fastest, 1.0)) + self.settings.push_cost
 
     def plan(
-        self, start: Array, goal: Array, seed: int | None = None, thorough: bool = True
+        self,
+        start: Array,
+        goal: Array,
+        seed: int | None = None,
+        thorough: bool = True,
+        robot: Array | None = None,
     ) -> Iterator[Progress]:
         """Plan in small slices: each ``next`` does a little work and reports.
 
-        thorough: whether a long search follows where the others find no plan.
+        thorough: whether a long search follows where the others find no plan. robot: ``(3,)`` pose
+        of the robot, from which it must have a way to the first side; None if unknown.
 
         The last report carries the best plan, and a plan that is reported never costs more than
         one before it. The work is counted, never timed, so that equal inputs and seeds give equal
@@ -159,7 +166,7 @@ class PushPlanner:
         PlanningFailed: when there is no plan; from the ``next`` that finds it out.
         """
         settings = self.settings
-        work = _Work(settings, settings.seed if seed is None else seed)
+        work = _Work(settings, settings.seed if seed is None else seed, robot)
         start = np.array([start[0], start[1], se2.wrap(start[2])])
         goal = np.array([goal[0], goal[1], se2.wrap(goal[2])])
         self.check(start, "start", PlanError.START_OCCUPIED)
@@ -248,7 +255,8 @@ class PushPlanner:
                     break
                 size = settings.refinement / 2.0 ** ((number - 1) % _SIZES / 2)
                 poses = nearby(np.array(between), _NEARBY, size, work.random)
-                graph = PushGraph(self.scene, start, goal, poses.free(self.scene), np.inf)
+                free = poses.free(self.scene)
+                graph = PushGraph(self.scene, start, goal, free, np.inf, work.robot)
             search = PushSearch(graph, bound, 1.0, min(most, work.effort()))
             for _ in search.run(work.statistics):
                 yield Progress(f"improving, round {number + 1}", best)
@@ -304,7 +312,7 @@ class PushPlanner:
             candidates += manoeuvres(scene, goal, -1.0, guide.length, around, work.random)
         spacing = max(settings.waypoint_spacing, guide.length / most)
         reach = max(_REACH[0] * settings.waypoint_spacing, _REACH[1] * spacing)
-        return PushGraph(scene, start, goal, candidates.free(scene), reach)
+        return PushGraph(scene, start, goal, candidates.free(scene), reach, work.robot)
 
     def solve(self, start: Array, goal: Array, seed: int | None = None) -> PushPlan:
         """The final plan of ``plan``."""

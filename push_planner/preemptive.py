@@ -15,8 +15,9 @@ from push_model.kinematics import unicycle_step
 from push_model.push_segment import PushSegment
 from push_planner.planner import PushPlanner
 from push_planner.push_curve import shortest_push_curve
+from push_planner.push_graph import PushStep
 from push_planner.push_plan import PlanError, PlanningFailed, Progress, PushPlan
-from push_planner.push_search import PushStep
+from push_planner.robot_path import has_way
 
 
 def preemptive_pushes(
@@ -26,8 +27,13 @@ def preemptive_pushes(
     seed: int,
     lengths: tuple[float, ...] = (0.15, 0.3, 0.5, 0.8, 1.1, 1.4),
     curvatures: int = 3,
+    robot: Array | None = None,
 ) -> list[PushSegment]:
     """Constant-curvature pushes of the object from ``start`` ``(3,)`` that collide with nothing.
+
+    Parameters
+    ----------
+    robot: ``(3,)`` pose of the robot, from which it must have a way to the side; None if unknown.
 
     Returns
     -------
@@ -37,11 +43,17 @@ def preemptive_pushes(
     scene = planner.scene
     start, goal = scene.item.mass_pose(start), scene.item.mass_pose(goal)
     leaving, safe = scene.leaving(start), scene.settings.safety_distance
+    outline = se2.transform(start, scene.shape.outline)
     found: list[tuple[float, PushSegment]] = []
     for side in scene.sides:
         drawn = random.uniform(0.95 * side.trusted.minimum, 0.95 * side.trusted.maximum, curvatures)
         begin = side.robot_pose(start)
         if not scene.has_room(begin, side, leaving):
+            continue
+        there = scene.standoff(begin, side)
+        if robot is not None and not has_way(
+            scene.field, scene.robot, scene.settings, robot, there, outline
+        ):
             continue
         for curvature in [0.0, *drawn]:
             for length in lengths:
@@ -61,12 +73,14 @@ def preemptive_pushes(
 
 
 def plan_after_preemptive_push(
-    planner: PushPlanner, start: Array, goal: Array, seed: int
+    planner: PushPlanner, start: Array, goal: Array, seed: int, robot: Array | None = None
 ) -> Iterator[Progress]:
     """Plan in slices like ``PushPlanner.plan``, with a pre-emptive push first.
 
     The pre-emptive pushes are tried one after the other. The plans that are reported begin with the
     first of them from whose end a plan is found.
+
+    robot: see ``preemptive_pushes``.
 
     Raises
     ------
@@ -74,7 +88,8 @@ def plan_after_preemptive_push(
     """
     planner.check(start, "start", PlanError.START_OCCUPIED)
     planner.check(goal, "goal", PlanError.GOAL_OCCUPIED)
-    offers = preemptive_pushes(planner, start, goal, seed)[: planner.settings.max_preemptive]
+    offers = preemptive_pushes(planner, start, goal, seed, robot=robot)
+    offers = offers[: planner.settings.max_preemptive]
     yield Progress("pre-emptive pushes", None)
     failure = "no push away from the start was found"
     for number, offer in enumerate(offers, 1):
@@ -82,7 +97,10 @@ def plan_after_preemptive_push(
         rest: PushPlan | None = None
         whole: PushPlan | None = None
         try:
-            for progress in planner.plan(offer.object_end, goal, thorough=False):
+            back = np.array([-planner.settings.standoff, 0.0, 0.0])
+            after = se2.compose(offer.robot_end, back)
+            plans = planner.plan(offer.object_end, goal, thorough=False, robot=after)
+            for progress in plans:
                 if progress.best is not None and progress.best is not rest:
                     rest = progress.best
                     whole = _preceded(planner, offer, rest)

@@ -9,8 +9,8 @@ import numpy as np
 
 from push_model.arrays import Array
 from push_planner.guide_path import origin_floor
+from push_planner.push_graph import SearchStatistics
 from push_planner.push_plan import PlanError, PlanningFailed
-from push_planner.push_search import SearchStatistics
 from push_planner.scene import PushScene
 
 

@@ -1,5 +1,6 @@
 """A way for the robot alone between two poses."""
 
+from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
@@ -17,6 +18,8 @@ from push_model.trajectory import Trajectory
 from push_planner.robot_drive import Room, fastest_drive
 from push_planner.settings import PlannerSettings
 
+OUTLINE_SLACK = 5e-3
+"""[m] by which circles that stand for an outline may ask for too much room."""
 _OUTLINE_SPACING = 0.01  # [m] of points between which distances are interpolated
 
 
@@ -59,11 +62,75 @@ def plan_robot_path(
     ------
     NoRobotPath
     """
+    found = _find_way(field, robot, settings, start, goal, disc_capsules(circles))
+    capsules, ends, body, need = found.capsules, found.ends, found.body, found.need
+
+    def keeps(chords: Array, margin: float) -> bool:
+        at = (chords - field.args[:2]) * field.args[2]
+        wanted = need + margin * field.args[2]
+        return bool(chain_keeps(field.values, capsules, body, ends, wanted, at))
+
+    tight = bool(ends[:, 2].any())
+    room = _outline_room(field, robot, circles) if tight else None
+    return fastest_drive(found.corners, start, goal, keeps, robot.differential, settings, room)
+
+
+@dataclass(frozen=True)
+class _Way:
+    """Corners ``(n, 2)`` [m] and what a check of curves along them needs, see ``room.py``."""
+
+    corners: Array
+    capsules: Array
+    body: float
+    need: float
+    ends: Array
+
+
+def has_way(
+    field: DistanceField,
+    robot: RobotSpec,
+    settings: PlannerSettings,
+    start: Array,
+    goal: Array,
+    outline: Array,
+) -> bool:
+    """Whether the robot has a way between two poses ``(3,)`` around an outline ``(n, 2)`` [m].
+
+    True also where it stands too close to something to plan a way: it has to back off first.
+    """
+    capsules = np.column_stack(
+        [
+            outline,
+            np.roll(outline, -1, axis=0),
+            np.full(len(outline), robot.footprint_radius + OUTLINE_SLACK),
+        ]
+    )
+    try:
+        _find_way(field, robot, settings, start, goal, capsules)
+    except NoRobotPath as error:
+        return error.code == RobotPathError.START_BLOCKED
+    return True
+
+
+def _find_way(
+    field: DistanceField,
+    robot: RobotSpec,
+    settings: PlannerSettings,
+    start: Array,
+    goal: Array,
+    capsules: Array,
+) -> _Way:
+    """capsules: ``(n, 5)`` [m] that the axle midpoint stays out of.
+
+    Raises
+    ------
+    NoRobotPath
+    """
     body = robot.footprint_radius * field.args[2]
     need = settings.safety_distance * field.args[2]
     # A bumper's corners reach farther than the body: with it in between, the robot can still leave.
     least = (robot.body_radius - robot.footprint_radius) * field.args[2]
-    capsules = scaled_capsules(disc_capsules(circles), field.args[:2], field.args[2])
+    capsules = scaled_capsules(capsules, field.args[:2], field.args[2])
     tips = field.lattice(start[:2]), field.lattice(goal[:2])
     for tip, code, what in (
         (tips[0], RobotPathError.START_BLOCKED, "the robot stands"),
@@ -85,16 +152,8 @@ def plan_robot_path(
             "no path of the robot connects start and goal; the robot needs passages of at least "
             f"{2.0 * (robot.footprint_radius + settings.safety_distance):.3f} m",
         )
-    points = np.vstack([start[:2], way[1:-1] * field.spacing + field.args[:2], goal[:2]])
-
-    def keeps(chords: Array, margin: float) -> bool:
-        at = (chords - field.args[:2]) * field.args[2]
-        wanted = need + margin * field.args[2]
-        return bool(chain_keeps(field.values, capsules, body, ends, wanted, at))
-
-    tight = bool(ends[:, 2].any())
-    room = _outline_room(field, robot, circles) if tight else None
-    return fastest_drive(points, start, goal, keeps, robot.differential, settings, room)
+    corners = np.vstack([start[:2], way[1:-1] * field.spacing + field.args[:2], goal[:2]])
+    return _Way(corners, capsules, body, need, ends)
 
 
 def _outline_room(field: DistanceField, robot: RobotSpec, circles: Array) -> Room:

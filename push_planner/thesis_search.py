@@ -14,7 +14,8 @@ import numpy as np
 from push_model import se2
 from push_planner.candidate_poses import Candidates
 from push_planner.guide_path import GuidePath, waypoints
-from push_planner.push_search import PushGraph, PushStep, SearchNode, SearchStatistics, trace
+from push_planner.push_graph import PushGraph, PushStep, SearchStatistics
+from push_planner.push_search import SearchNode, trace
 from push_planner.scene import PushScene
 
 _SLICE = 20  # pushes tried between two reports

@@ -67,9 +67,10 @@ class Uncertainty:
             motion_capture__rate=self.rate,
             motion_capture__latency=latency,
             motion_capture__latency_jitter=self.latency_jitter,
-            motion_capture__dropout=self.dropout,
         ).settings("controller", tracker__pose_delay=known)
         believed = believed.settings("group", control__pose_delay=known)
+        if self.dropout > 0.0:
+            believed = believed.settings("bridge", motion_capture__dropout=self.dropout)
         if self.estimated:
             believed = believed.settings("estimator", enabled=True)
         drawn: Row = {} if low == high else {"latency_s": latency}

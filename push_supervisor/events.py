@@ -86,6 +86,13 @@ class MapChanged:
 
 
 @dataclass(frozen=True)
+class WayBlocked:
+    """Another body stands on the way of the pushes that are still to do."""
+
+    message: str
+
+
+@dataclass(frozen=True)
 class ClockReset:
     """The clock of the poses went back."""
 
@@ -110,6 +117,7 @@ Event = (
     | MotionFailed
     | ObjectMoved
     | MapChanged
+    | WayBlocked
     | ClockReset
     | JobAborted
 )

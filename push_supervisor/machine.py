@@ -104,6 +104,8 @@ class Machine:
                 self._abort(event.code, event.message)
             case events.MapChanged():
                 self._on_map(event.problem)
+            case events.WayBlocked():
+                self._on_blocked(event.message)
             case events.ExecuteCommanded() if state is State.IDLE:
                 self._on_execute()
             case events.PlanFound() if state is State.PLANNING:
@@ -371,18 +373,21 @@ class Machine:
         self._plan_anew(message)
 
     def _on_map(self, problem: str) -> None:
-        """A plan that is still being made is the planner's to begin anew."""
-        if not problem:
-            if self.state is State.POSITIONING:  # the way there may lead through a wall now
-                self._say(commands.Stop())
-                self._position("the map has changed")
-        elif self.plan_ready:
+        if problem:
+            self._on_blocked(problem)
+        elif self.state is State.POSITIONING:  # the way there may lead through a wall now
+            self._say(commands.Stop())
+            self._position("the map has changed")
+
+    def _on_blocked(self, problem: str) -> None:
+        """What is left of the plan cannot be done; one that is being made is the planner's."""
+        if self.plan_ready:
             self._plan(f"making a new plan: {problem}")
         elif self.state is State.DETACHING:
             self._recovering, self._backing_off = self._recovering or problem, ""
         elif self.state is State.PUSHING:
             self._retreat(problem)
-        elif self.state in (State.POSITIONING, State.APPROACH):
+        elif self.state in _MOVING:
             self._say(commands.Stop())
             self._replan(problem)
 

@@ -139,6 +139,20 @@ def near(circles: Array, trajectory: Trajectory, reach: float) -> Array:
     return close
 
 
+def widened(circles: Array, trajectory: Trajectory, by: float, stray: float) -> Array:
+    """The circles, wider by so much [m], but ``stray`` [m] off the trajectory where that is less.
+
+    None becomes narrower.
+    """
+    path = trajectory.pose[:, :2]
+    apart = np.hypot(
+        circles[:, None, 0] - path[None, :, 0], circles[:, None, 1] - path[None, :, 1]
+    ).min(axis=1, initial=np.inf)
+    wide = circles.copy()
+    wide[:, 2] = np.maximum(circles[:, 2], np.minimum(circles[:, 2] + by, apart - stray))
+    return wide
+
+
 def spared(circles: Array, trajectory: Trajectory) -> Array:
     """The circles, no wider than both ends of the trajectory allow.
 

@@ -29,11 +29,12 @@ from push_ros.qos import LATCHED, STREAM
 from push_ros.validation import FRAME
 from push_scenario.scenario import Scenario, load_scenario
 from push_supervisor import commands, events, motions
+from push_supervisor.blocked_way import BlockedWay
 from push_supervisor.commands import Command, Question
 from push_supervisor.displacement import Displacement
 from push_supervisor.event_queue import EventQueue
 from push_supervisor.events import Event
-from push_supervisor.machine import Machine
+from push_supervisor.machine import Machine, State
 from push_supervisor.peers import Peers
 from push_supervisor.requests import Moment, Peer, Request, Requests, Step
 from push_supervisor.settings import SupervisorSettings
@@ -75,6 +76,7 @@ class SupervisorNode(Node):
         self._requests = Requests(self.settings)
         self._ticks = 0
         self._displacement = Displacement(self.machine)
+        self._blocked_way = BlockedWay(self.machine)
         self._world: Any = None  # what the world says that robot and object are
         self._fire = EventQueue(self.machine, self._carry_out, self._publish_state).fire
         self._diagnostics = Diagnostics(self, self.names, self._diagnose)
@@ -200,6 +202,7 @@ class SupervisorNode(Node):
         self._intake.frame(self._poses.stamp, lambda: seen, self.ready and len(seen) == 2)
         if self._ticks % 2 == 0:
             self._watch_displacement()
+            self._watch_way()
             if self._intake.waited_for:
                 self._intake.feedback(self._feedback())
 
@@ -213,6 +216,19 @@ class SupervisorNode(Node):
         moved = self._displacement.look(self._pose(self.object))
         if moved is not None:
             self._fire(moved)
+
+    def _watch_way(self) -> None:
+        near = self.surroundings
+        bodies = near.bodies({name: self._pose(name) for name in near.others})
+        blocked = self._blocked_way.look(self._pose(self.object), bodies, near.outlines)
+        if blocked is not None:
+            self._fire(blocked)
+        robot, item = self._pose(self.robot), self._pose(self.object)
+        if self.machine.state is not State.PUSHING or robot is None or item is None:
+            return
+        drift = near.drift(self.machine.segment, robot, item)
+        if drift:
+            self._fire(events.WayBlocked(drift))
 
     def _pose(self, name: str) -> Array | None:
         """The pose ``(3,)`` of a body, None when it is not known now."""
@@ -280,7 +296,7 @@ class SupervisorNode(Node):
         match command:
             case commands.MakePlan(goal, preemptive):
                 stamp, others = self._poses.stamp, near.bodies(bodies)
-                peers.plan(number, item, goal, stamp, preemptive, others)
+                peers.plan(number, item, goal, stamp, preemptive, others, robot)
             case commands.FindPath(segment):
                 circles = near.on_the_way(item, bodies)
                 wait = motions.standoff(segment, item)

@@ -90,14 +90,17 @@ class Peers:
         stamp: float,
         preemptive: bool,
         bodies: Array,
+        robot: Array,
     ) -> None:
-        """Ask for a plan. bodies: circles ``(n, 3)`` about others. stamp: [s] of the poses."""
+        """Ask for a plan. bodies: circles ``(n, 3)`` about others. stamp: [s] of the poses.
+        robot: ``(3,)`` its pose."""
         request = PlanPush.Goal(
             mode=PlanPush.Goal.PREEMPTIVE if preemptive else PlanPush.Goal.DIRECT,
             object=self._item,
             robot=self._robot,
             start=pose_stamped_to_ros(start, stamp),
             goal=pose_stamped_to_ros(goal, stamp),
+            robot_pose=pose_stamped_to_ros(robot, stamp),
             obstacles=circles_to_ros(bodies),
         )
 

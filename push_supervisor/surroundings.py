@@ -13,7 +13,7 @@ from push_model import se2
 from push_model.arrays import Array
 from push_model.jobs import GoalRefused, JobError
 from push_model.occupancy import OccupancyGrid
-from push_model.outlines import convex_hull
+from push_model.outlines import convex_hull, inset
 from push_model.push_segment import PushSegment
 from push_model.specs import ObjectSpec, RobotSpec
 from push_model.traction import too_heavy
@@ -24,6 +24,10 @@ from push_supervisor.settings import SupervisorSettings
 
 _LOOK_AHEAD = 3.0  # [s] of full speed beside a motion within which obstacles matter
 _TOUCHING = 0.8  # of the distance that a robot backs off: nearer, it has not backed off
+_STRAY = 0.006  # [m] that a robot that pushes may come nearer to a wall than is planned
+_DRIFT = 0.006  # [m] beside the path of a push from which on what lies ahead is looked at
+_FORESEEN, _STEP = 0.12, 0.01  # [m] of the path that is looked at, and between places on it
+_KEEP = 0.003  # [m] that robot and object keep off walls there
 _FASTEST = 0.9  # of its greatest speed, at which a robot approaches and backs off
 _NONE = np.zeros((0, 3))
 
@@ -52,7 +56,13 @@ class Surroundings:
         self._too_heavy = too_heavy(robot, item)
         self._outline, self._item_outline = robot.outline, item.outline
         self._hull = convex_hull(self._item_outline)
+        self._wide = tuple(inset(o, -_KEEP) for o in (self._outline, self._item_outline))
         self._item_radius = item.geometry.circumradius
+
+    @property
+    def outlines(self) -> tuple[Array, Array]:
+        """``(n, 2)`` [m] of robot and object in their frames."""
+        return self._outline, self._item_outline
 
     def change_settings(self, settings: SupervisorSettings) -> None:
         """The margin may be another one."""
@@ -104,6 +114,34 @@ class Surroundings:
                     return f"the map has changed: push {number} meets an obstacle at {where}"
         return ""
 
+    def drift(self, segment: PushSegment, robot: Array, item: Array) -> str:
+        """What robot or object will meet if they go on as far beside the path of a push as they are
+        now, in words; empty if nothing. Plans answer for the path itself only."""
+        if self.grid is None:
+            return ""
+        path = segment.trajectory.pose
+        first = int(np.argmin(np.hypot(*(path[:, :2] - robot[:2]).T)))
+        beside = se2.between(path[first], robot)
+        if abs(float(beside[1])) < _DRIFT:
+            return ""
+        way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path[first:, :2], axis=0).T))])
+        grasp, done = se2.between(robot, item), -_STEP
+        for ahead, pose in zip(way, path[first:], strict=True):
+            if ahead > _FORESEEN:
+                break
+            if ahead < done + _STEP:
+                continue
+            done = ahead
+            there = se2.compose(pose, beside)
+            for what, outline, at in (
+                ("the robot", self._wide[0], there),
+                ("the object", self._wide[1], se2.compose(there, grasp)),
+            ):
+                if overlaps(self.grid, outline, at):
+                    off = f"{1e3 * abs(float(beside[1])):.0f} mm"
+                    return f"the robot is {off} beside its path, on which {what} meets an obstacle"
+        return ""
+
     def bodies(self, poses: Mapping[str, Array | None], extra: float = 0.0) -> Array:
         """Circles ``(n, 3)`` about the other bodies, as wide as they are and ``extra`` [m]."""
         rows = [
@@ -145,8 +183,16 @@ class Surroundings:
         return way, self._beside(self.walls, way)
 
     def push(self, segment: PushSegment) -> Array:
-        """What to keep off in a push."""
-        return self._beside(self.walls, segment.trajectory)
+        """What to keep off in a push.
+
+        The robot leaves its path where the object has slid along the bumper. Its bumper reaches
+        farther than its body, so that walls are as wide as the bumper asks for, as far as the path
+        keeps off them by ``_STRAY`` more.
+        """
+        way = segment.trajectory
+        circles = motions.near(self.walls, way, _LOOK_AHEAD * self.robot.max_speed)
+        reach = self.robot.footprint_radius - self.robot.body_radius
+        return motions.spared(motions.widened(circles, way, reach, _STRAY), way)
 
     def retreat(self, robot: Array, item: Array) -> tuple[Trajectory, Array]:
         """Away from the object, keeping off walls."""

@@ -10,7 +10,7 @@ from push_model.occupancy import rasterise
 from push_model.specs import EnvironmentSpec
 from push_planner import PlannerSettings, PushPlanner, joined
 from push_planner.push_curve import shortest_push_curve
-from push_planner.push_search import PushStep
+from push_planner.push_graph import PushStep
 
 SETTINGS = PlannerSettings()
 

@@ -15,7 +15,8 @@ from push_planner import (
 )
 from push_planner.candidate_poses import Candidates, nearby, runs, scattered
 from push_planner.guide_path import path_cost
-from push_planner.push_search import PushGraph, PushSearch, SearchStatistics
+from push_planner.push_graph import PushGraph, SearchStatistics
+from push_planner.push_search import PushSearch
 from push_planner.rough_cost import guessed_length
 
 START = np.array([-0.9, -0.5, 0.4])

@@ -31,6 +31,7 @@ from push_supervisor.events import (
     PathFound,
     PlanFailed,
     PlanFound,
+    WayBlocked,
 )
 
 
@@ -235,12 +236,13 @@ def test_a_moved_object_next_to_the_robot_is_backed_off_from():
 NEW_MAP = MapChanged("push 1 meets a wall")
 
 
+@pytest.mark.parametrize("blocked", [NEW_MAP, WayBlocked("a body stands there")])
 @pytest.mark.parametrize("steps", range(8))
-def test_a_map_that_blocks_the_plan_makes_it_anew_in_every_state(steps):
+def test_a_map_or_a_body_that_blocks_the_plan_makes_it_anew_in_every_state(steps, blocked):
     machine, _ = make()
     walk(machine, *[GOAL, planned(0, 1), PATH, DONE, DONE, DONE, DONE][:steps])
     before = machine.state
-    out = commands(machine.handle(NEW_MAP))
+    out = commands(machine.handle(blocked))
     if before in (State.IDLE, State.PLANNING):
         assert out == [] and machine.state is before
     elif before in (State.POSITIONING, State.APPROACH):
@@ -426,6 +428,7 @@ ANY = st.sampled_from(
         MotionFailed("m", lost=True),
         ObjectMoved("m"),
         MapChanged("p"),
+        WayBlocked("p"),
         MapChanged(),
         ClockReset(),
     ]

@@ -1,0 +1,259 @@
+"""The graph of layer 2: object poses, and the pushes between them, each computed when asked for.
+
+The result of a push is stored. It serves all nodes of a search that the push may lead to, and the
+estimates of later searches.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from push_model import se2
+from push_model.arrays import Array
+from push_planner.candidate_poses import Candidates
+from push_planner.push_curve import PushCurve, shortest_push_curve
+from push_planner.robot_path import has_way
+from push_planner.rough_cost import BLOCKED, guessed_length, pushes_into, rough_costs
+from push_planner.scene import PushScene, PushSide
+from push_planner.shortest_chord import shortest_chords
+
+
+@dataclass
+class SearchStatistics:
+    """Counts of the work of one search.
+
+    expanded: entries of the queue that were processed. generated: nodes that were added to it.
+    solved: push curves that were computed. feasible: curves that exist and are free of collisions.
+    """
+
+    expanded: int = 0
+    generated: int = 0
+    solved: int = 0
+    feasible: int = 0
+
+
+@dataclass(frozen=True)
+class PushStep:
+    """One push of a sequence.
+
+    side: the pushed side. curve: path of the robot's axle midpoint. object_start, object_end:
+    ``(3,)`` [m, m, rad] poses of the object's centre of mass, world frame. clearance: [m] of robot
+    and object to obstacles along the push.
+    """
+
+    side: PushSide
+    curve: PushCurve
+    object_start: Array
+    object_end: Array
+    clearance: float
+
+
+class PushGraph:
+    """Object poses, estimated costs of the pushes between them, and the pushes that were computed.
+
+    The first pose is the start, the last one is the goal, and the others are ordered along Gamma.
+    """
+
+    def __init__(
+        self,
+        scene: PushScene,
+        start: Array,
+        goal: Array,
+        candidates: Candidates,
+        reach: float,
+        robot: Array | None = None,
+    ) -> None:
+        """Build the graph.
+
+        Parameters
+        ----------
+        scene: robot, object and map.
+        start, goal: ``(3,)`` [m, m, rad] poses of the object's centre of mass, world frame.
+        candidates: poses of the object between start and goal.
+        reach: [m] longest distance along Gamma that one push may cover.
+        robot: ``(3,)`` pose of the robot before the first push; None if unknown.
+        """
+        self.scene = scene
+        self._robot = robot
+        self._ways: dict[tuple[int, int, int], bool] = {}
+        order = np.argsort(candidates.way, kind="stable")
+        self.poses = np.vstack([start, candidates.poses[order], goal])
+        first, last = (candidates.way.min(), candidates.way.max()) if len(order) else (0.0, 0.0)
+        way = self.way = np.concatenate([[first], candidates.way[order], [last]])
+        self.window = np.column_stack(
+            [
+                np.searchsorted(way, way - reach, side="left"),
+                np.searchsorted(way, way + reach, side="right"),
+            ]
+        )
+        c, s = np.cos(self.poses[:, 2]), np.sin(self.poses[:, 2])
+        robots = []
+        for side in scene.sides:
+            x, y, theta = se2.inverse(side.grasp)
+            heading = self.poses[:, 2] + theta
+            position = self.poses[:, :2] + np.column_stack([c * x - s * y, s * x + c * y])
+            robots.append(np.column_stack([position, heading, np.cos(heading), np.sin(heading)]))
+        self.robots = np.array(robots)
+        self.leaving = scene.leaving(self.poses[0])
+        self.room = np.array(
+            [
+                scene.rooms(np.ascontiguousarray(r[:, :3]), side)
+                for r, side in zip(robots, scene.sides, strict=True)
+            ]
+        )
+        self.room[:, 0] = [
+            scene.has_room(r[0, :3], side, self.leaving)
+            for r, side in zip(robots, scene.sides, strict=True)
+        ]
+        self.grasps = np.array([s.grasp for s in scene.sides])
+        self.chords = np.array(
+            [shortest_chords(s.trusted.minimum, s.trusted.maximum) for s in scene.sides]
+        )
+        settings = scene.settings
+        widest = int((self.window[:, 1] - self.window[:, 0]).max())
+        self._sight = np.zeros((*self.room.shape, widest), dtype=np.int8)
+        self._costs = (settings.push_cost, settings.side_change_cost)
+        keeps = np.array([self.leaving, settings.safety_distance])
+        least = scene.shape.inradius + np.minimum(keeps, settings.safety_distance)
+        self._view = (self.window, self._sight, least, scene.field.values, *scene.field.args)
+        self.arrivals = 0  # pushes found that end at the goal
+        self._pushes: dict[tuple[int, int, int], PushStep | None] = {}
+
+    def rough_costs(self, bound: float) -> tuple[Array, float]:
+        """Estimated cost [m] from the start to each state ``(n, sides)``, and of a whole plan [m].
+
+        bound: [m] states whose estimate exceeds it are left out.
+        """
+        ready, arrived = rough_costs(
+            self.poses,
+            self.robots,
+            self.room,
+            self.chords,
+            self.grasps,
+            *self._costs,
+            bound,
+            *self._view,
+        )
+        return ready, float(arrived[-1].min())
+
+    def leave(self, statistics: SearchStatistics, enough: float = math.inf) -> int:
+        """Compute pushes that begin at the start, until ``enough`` are feasible.
+
+        Returns the number of feasible pushes. Adds the work to the statistics.
+        """
+        found = 0
+        for side in range(len(self.scene.sides)):
+            for pose in range(1, self.window[0, 1]):
+                if found >= enough:
+                    return found
+                if self.worth_leaving_for(side, pose):
+                    found += self.push(0, pose, side, statistics) is not None
+        return found
+
+    def worth_leaving_for(self, side: int, pose: int) -> bool:
+        """Whether a push from the start to a pose is worth computing.
+
+        The robot must have room at both ends, and the push must not have to make a loop.
+        """
+        if not (self.room[side, 0] and self.room[side, pose]):
+            return False
+        (ax, ay, _, ac, sa), (bx, by, _, bc, sb) = self.robots[side, 0], self.robots[side, pose]
+        length = guessed_length(ax, ay, ac, sa, bx, by, bc, sb, self.chords[side])
+        return bool(length < math.inf)
+
+    def pushes_into(
+        self, pose: int, following: int, cost: float, weight: float, bound: float, ready: Array
+    ) -> Any:
+        """Estimated costs of plans through the pushes that end at a pose, and where these begin.
+
+        Arguments and result are those of ``rough_cost.pushes_into``.
+        """
+        return pushes_into(
+            pose,
+            following,
+            cost,
+            weight,
+            self.poses,
+            self.robots,
+            self.room,
+            self.chords,
+            self.grasps,
+            *self._costs,
+            bound,
+            *self._view,
+            ready,
+        )
+
+    def side_change(self, pose: int, before: int, after: int) -> float:
+        """Cost [m] of changing from one side to another at a pose; 0 if the side is the same.
+
+        before, after: numbers of the sides; -1 for ``after`` if no push follows.
+        """
+        if after < 0 or before == after:
+            return 0.0
+        if not self._ways.get((pose, before, after), True):
+            return math.inf
+        way = self.robots[before, pose, :2] - self.robots[after, pose, :2]
+        return float(np.hypot(*way)) + self.scene.settings.side_change_cost
+
+    def may_begin(self, side: int) -> bool:
+        """Whether the robot can go from where it is to a side at the start, as far as is known."""
+        if self._robot is None:
+            return True
+        key = (0, -1, side)
+        if key not in self._ways:
+            self._ways[key] = self._has_way(0, self._robot, self._behind(0, side))
+        return self._ways[key]
+
+    def may_change(self, pose: int, before: int, after: int) -> bool:
+        """Whether the robot can go round the object at a pose, from one side to another.
+
+        Computed when it is first asked for. ``side_change`` is infinite after a refusal.
+        """
+        key = (pose, before, after)
+        if after < 0 or before == after:
+            return True
+        if key not in self._ways:
+            ends = self._behind(pose, before), self._behind(pose, after)
+            self._ways[key] = self._has_way(pose, *ends)
+        return self._ways[key]
+
+    def _behind(self, pose: int, side: int) -> Array:
+        return self.scene.standoff(self.robots[side, pose, :3], self.scene.sides[side])
+
+    def _has_way(self, pose: int, start: Array, goal: Array) -> bool:
+        scene = self.scene
+        outline = se2.transform(self.poses[pose], scene.shape.outline)
+        return has_way(scene.field, scene.robot, scene.settings, start, goal, outline)
+
+    def push(
+        self, first: int, last: int, side: int, statistics: SearchStatistics
+    ) -> PushStep | None:
+        """The push on a side from one pose to another; computed once and then stored.
+
+        None if there is no curve within the curvature limits, or if it is not free of collisions.
+        """
+        key = (first, last, side)
+        if key not in self._pushes:
+            statistics.solved += 1
+            self._pushes[key] = self._try(first, last, side)
+            if self._pushes[key] is not None:
+                statistics.feasible += 1
+                self.arrivals += last == len(self.poses) - 1
+            elif self.window[first, 0] <= last < self.window[first, 1]:
+                self._sight[side, first, last - self.window[first, 0]] = BLOCKED
+        return self._pushes[key]
+
+    def _try(self, first: int, last: int, number: int) -> PushStep | None:
+        side = self.scene.sides[number]
+        start, end = self.robots[number, first, :3], self.robots[number, last, :3]
+        curve = shortest_push_curve(start, end, side.trusted.minimum, side.trusted.maximum)
+        if curve is None:
+            return None
+        leaving = self.leaving if first == 0 else math.inf
+        clearance = self.scene.kept(curve, side, leaving)
+        if clearance is None:
+            return None
+        return PushStep(side, curve, self.poses[first], self.poses[last], clearance)

@@ -1,0 +1,83 @@
+"""Plans are such that the robot can go from side to side between the pushes."""
+
+import numpy as np
+import pytest
+
+from push_model import se2
+from push_model.occupancy import rasterise
+from push_model.specs import EnvironmentSpec
+from push_planner import PlanError, PlannerSettings, PlanningFailed, PushPlanner
+from push_planner.bodies import with_bodies
+from push_planner.robot_path import has_way
+from push_scenario.scenario import load_scenario
+
+SETTINGS = PlannerSettings()
+CORRIDOR = EnvironmentSpec((3.0, 0.22))
+WIDE = EnvironmentSpec((3.0, 1.0))
+
+
+def solved(planner, start, goal, robot):
+    best = None
+    for progress in planner.plan(start, goal, robot=robot):
+        best = progress.best
+    return best
+
+
+def refused_changes(planner, plan, robot):
+    """Side changes of a plan for which the robot has no way; its first side included."""
+    scene, refused = planner.scene, 0
+    for segment in plan.segments:
+        outline = se2.transform(segment.object_start, scene.item.outline)
+        if robot is not None:
+            refused += not has_way(
+                scene.field, scene.robot, SETTINGS, robot, segment.standoff, outline
+            )
+        back = np.array([-SETTINGS.standoff, 0.0, 0.0])
+        robot = se2.compose(segment.robot_end, back)
+    return refused
+
+
+@pytest.mark.parametrize("goal", [[0.6, 0.0, 0.0], [-0.6, 0.0, 0.0]])
+def test_a_robot_that_cannot_pass_the_object_does_not_plan_to_push_it_back(robot, box, goal):
+    """The robot is to the left of the box, in a corridor in which it cannot pass it."""
+    here, start = np.array([-0.4, 0.0, 0.0]), np.zeros(3)
+    planner = PushPlanner(SETTINGS, rasterise(CORRIDOR), robot, box)
+    assert len(solved(planner, start, np.array(goal), None).segments) >= 1, "wherever it may be"
+    if goal[0] > 0.0:
+        assert len(solved(planner, start, np.array(goal), here).segments) == 1
+    else:
+        with pytest.raises(PlanningFailed) as refusal:
+            solved(planner, start, np.array(goal), here)
+        assert refusal.value.code is PlanError.NO_PUSH_SEQUENCE
+    wide = PushPlanner(SETTINGS, rasterise(WIDE), robot, box)
+    plan = solved(wide, start, np.array(goal), here)
+    assert refused_changes(wide, plan, here) == 0
+
+
+def test_plans_beside_a_body_never_ask_for_a_way_that_the_robot_does_not_have(monkeypatch):
+    """A body stands in front of the box; unchecked, some plans need a way that is blocked."""
+    scenario = load_scenario("env1-target1")
+    robot, box = scenario.robot()[1], scenario.object()[1]
+    random = np.random.default_rng(3)
+    blind = solvable = 0
+    for number in range(8):
+        start = np.array([0.026, 0.065, 0.715])
+        angle, apart = random.uniform(-3.1, -2.2), random.uniform(0.15, 0.21)
+        body = start[:2] + apart * np.array([np.cos(angle), np.sin(angle)])
+        here = se2.compose(start, np.array([-0.19, 0.0, 0.0]))
+        margin = SETTINGS.safety_distance
+        circles = np.array([[*body, 0.04]])
+        grid = with_bodies(scenario.grid, circles, box.outline, start, margin)
+        planner = PushPlanner(SETTINGS, grid, robot, box)
+        with monkeypatch.context() as patch:
+            patch.setattr("push_planner.push_graph.has_way", lambda *_: True)
+            plan = solved(planner, start, np.array(scenario.goal), here)
+        blind += refused_changes(planner, plan, here) > 0
+        try:
+            plan = solved(planner, start, np.array(scenario.goal), here)
+        except PlanningFailed:
+            continue
+        solvable += 1
+        assert refused_changes(planner, plan, here) == 0, number
+    print(f"{blind} of 8 without a way where nobody looks; {solvable} with plans where one does")
+    assert blind >= 3 and solvable >= 6
