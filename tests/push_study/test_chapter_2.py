@@ -12,7 +12,13 @@ from push_mpc import ContactForceSettings
 from push_mpc.contact_force_mpc import PRINTED_GAINS
 from push_planner import PlannerSettings, PushPlanner, push_sides
 from push_scenario.scenario import load_scenario
-from push_study.experiments import displaced, goals_in_a_row, line_tracking, three_push
+from push_study.experiments import (
+    changing_world,
+    displaced,
+    goals_in_a_row,
+    line_tracking,
+    three_push,
+)
 from push_study.study import StudyOptions, run_study
 
 
@@ -131,6 +137,18 @@ def test_a_box_that_is_moved_in_mid_push_comes_to_its_goal_all_the_same(tmp_path
     assert row["displaced_m"] > 0.005 and row["position_error_m"] < 0.01
     displaced.conclude(options, [task], [row])
     assert "1 of 1 within 10 mm" in capsys.readouterr().out
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kind", changing_world.KINDS)
+def test_a_world_that_changes_in_mid_push_costs_a_new_plan_and_no_collision(tmp_path, capsys, kind):
+    options = StudyOptions(("env1-target1",), 1, 1, tmp_path)
+    (task,) = (t for t in changing_world.tasks(options) if t.kind == kind)
+    row = changing_world.trial(task)
+    assert row["success"] and row["collisions"] == 0, row
+    assert row["replans"] == (kind == "body") and row["position_error_m"] < 0.005
+    changing_world.conclude(options, [task], [row])
+    assert f"{kind}: 1 of 1 at the goal" in capsys.readouterr().out
 
 
 def test_disturbances_fill_their_ranges_where_the_robot_lets_them():
