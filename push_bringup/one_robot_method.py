@@ -36,6 +36,7 @@ from push_supervisor import (
     commands,
     events,
 )
+from push_supervisor.blocked_way import BlockedWay
 from push_supervisor.commands import Command, Question
 from push_supervisor.displacement import PERIOD
 
@@ -66,6 +67,7 @@ class OneRobotMethod:
         self.machine = Machine(self._settings, self._at_goal, self._touching)
         self._fire = EventQueue(self.machine, self._carry_out).fire
         self._displacement = Displacement(self.machine)
+        self._blocked_way = BlockedWay(self.machine)
         self._belief: Belief | None = None
         self._goal: Array | None = None  # of a task that no frame has come for yet
         self._seen: Seen | None = None
@@ -126,6 +128,8 @@ class OneRobotMethod:
         if not seen.time - self._looked < PERIOD - 1e-9:
             self._looked = seen.time
             self._tell(self._displacement.look(seen.object))
+            robot = seen.robots.get(self._name)
+            self._tell(self._blocked_way.look(self._near, robot, seen.object, seen.obstacles))
         command, event = self._drive.follow(seen, self._near.robot.body_radius)
         self._tell(event)
         if self._name in seen.robots:
@@ -168,7 +172,7 @@ class OneRobotMethod:
             return 0.0
         match question:
             case commands.MakePlan():
-                event = self._plans.plan(question, seen)
+                event = self._plans.plan(question, seen.robots[self._name], seen)
             case commands.FindPath():
                 event = self._plans.way(question, seen.robots[self._name], seen, self._near)
             case _:

@@ -61,12 +61,12 @@ class Plans:
         """No plan is wanted any more."""
         self._work = None
 
-    def plan(self, command: commands.MakePlan, seen: Seen) -> events.Event | None:
+    def plan(self, command: commands.MakePlan, robot: Array, seen: Seen) -> events.Event | None:
         """Do one slice of the work on a plan; the plan, or why there is none, after the last."""
         if self._work is None:
             self._draws += command.preemptive
             self._best: PushPlan | None = None
-            self._work = self._begin(command.goal, seen, self._draws * command.preemptive)
+            self._work = self._begin(command.goal, seen, robot, self._draws * command.preemptive)
         try:
             self._best = next(self._work).best
             return None
@@ -83,9 +83,9 @@ class Plans:
         self._work = None
         return answer
 
-    def _begin(self, goal: Array, seen: Seen, preemptive: int) -> Iterator[Progress]:
+    def _begin(self, goal: Array, seen: Seen, robot: Array, preemptive: int) -> Iterator[Progress]:
         planner = self.planner(self._robot, self._item)
-        yield from plan_among_bodies(planner, seen.object, goal, seen.obstacles, preemptive)
+        yield from plan_among_bodies(planner, seen.object, goal, seen.obstacles, preemptive, robot)
 
     def way(
         self, command: commands.FindPath, robot: Array, seen: Seen, near: Surroundings

@@ -1,4 +1,4 @@
-"""Whether another body has come to stand on the way of the pushes that are still to do."""
+"""Whether the pushes that are still to do can be done: other bodies on the way, drift to walls."""
 
 import math
 from collections.abc import Sequence
@@ -11,6 +11,7 @@ from push_model.outlines import distance, inside
 from push_model.push_segment import PushSegment
 from push_supervisor.events import WayBlocked
 from push_supervisor.machine import Machine, State
+from push_supervisor.surroundings import Surroundings
 
 _KEEP = 0.005  # [m] between a body and robot or object, less than plans keep
 _GIVE = 0.002  # [m] that a gap must shrink by: a body beside the object is not on its way
@@ -91,19 +92,30 @@ class BlockedWay:
         self._machine, self._count = machine, 0
 
     def look(
-        self, item: Array | None, bodies: Array, outlines: tuple[Array, Array]
+        self, near: Surroundings, robot: Array | None, item: Array | None, bodies: Array
     ) -> WayBlocked | None:
-        """The object at a pose ``(3,)``, or not seen. bodies, outlines: see ``obstruction``."""
+        """What ends the plan now, if anything does.
+
+        Parameters
+        ----------
+        robot, item: poses ``(3,)``; None where it is not seen.
+        bodies: ``(n, 3)`` [m] x, y, radius of others.
+        """
         machine = self._machine
-        watched = machine.state in _WATCHED or machine.plan_ready
+        pushing = machine.state is State.PUSHING
+        if pushing and robot is not None and item is not None:
+            drift = near.drift(machine.segment, robot, item)
+            if drift:
+                return WayBlocked(drift)
         found = None
+        watched = machine.state in _WATCHED or machine.plan_ready
         if watched and machine.remaining and item is not None and len(bodies):
-            found = obstruction(machine.remaining, outlines, bodies, item)
-        self._count = 0 if found is None else self._count + 1
+            found = obstruction(machine.remaining, near.outlines, bodies, item)
         if found is None:
+            self._count = 0
             return None
-        urgent = machine.state is State.PUSHING and found.ahead < _NEAR
-        if self._count < _LOOKS[0 if urgent else 1]:
+        self._count += 1
+        if self._count < _LOOKS[0 if pushing and found.ahead < _NEAR else 1]:
             return None
         self._count = 0
         where = f"({found.at[0]:.2f}, {found.at[1]:.2f})"

@@ -34,7 +34,7 @@ from push_supervisor.commands import Command, Question
 from push_supervisor.displacement import Displacement
 from push_supervisor.event_queue import EventQueue
 from push_supervisor.events import Event
-from push_supervisor.machine import Machine, State
+from push_supervisor.machine import Machine
 from push_supervisor.peers import Peers
 from push_supervisor.requests import Moment, Peer, Request, Requests, Step
 from push_supervisor.settings import SupervisorSettings
@@ -220,15 +220,10 @@ class SupervisorNode(Node):
     def _watch_way(self) -> None:
         near = self.surroundings
         bodies = near.bodies({name: self._pose(name) for name in near.others})
-        blocked = self._blocked_way.look(self._pose(self.object), bodies, near.outlines)
+        robot, item = self._pose(self.robot), self._pose(self.object)
+        blocked = self._blocked_way.look(near, robot, item, bodies)
         if blocked is not None:
             self._fire(blocked)
-        robot, item = self._pose(self.robot), self._pose(self.object)
-        if self.machine.state is not State.PUSHING or robot is None or item is None:
-            return
-        drift = near.drift(self.machine.segment, robot, item)
-        if drift:
-            self._fire(events.WayBlocked(drift))
 
     def _pose(self, name: str) -> Array | None:
         """The pose ``(3,)`` of a body, None when it is not known now."""

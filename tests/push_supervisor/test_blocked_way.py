@@ -88,14 +88,14 @@ def test_a_body_behind_or_beside_the_object_is_not_on_its_way(robot, box):
 @pytest.mark.parametrize(("ahead", "looks"), [(0.25, 2), (0.5, 10)])
 def test_a_near_body_stops_a_push_at_once_and_a_far_one_when_it_stays(robot, box, ahead, looks):
     push = arc(robot, box, np.zeros(3), 0.0)
-    machine = SimpleNamespace(state=State.PUSHING, remaining=[push], plan_ready=False)
-    watch, outlines = BlockedWay(machine), (robot.outline, box.outline)
+    machine = SimpleNamespace(state=State.PUSHING, remaining=[push], segment=push, plan_ready=False)
+    watch, near = BlockedWay(machine), Surroundings(robot, box, {}, SupervisorSettings())
     x = push.object_start[0] + ahead
     body, gone = np.array([[x, 0.0, 0.04]]), np.array([[x, 0.5, 0.04]])
     for _ in range(looks - 1):
-        assert watch.look(push.object_start, body, outlines) is None
-    assert watch.look(push.object_start, gone, outlines) is None, "it has passed"
-    told = [watch.look(push.object_start, body, outlines) for _ in range(looks)]
+        assert watch.look(near, push.robot_start, push.object_start, body) is None
+    assert watch.look(near, push.robot_start, push.object_start, gone) is None, "it has passed"
+    told = [watch.look(near, push.robot_start, push.object_start, body) for _ in range(looks)]
     assert told[:-1] == [None] * (looks - 1)
     assert told[-1].message == f"a body at ({x:.2f}, 0.00) stands on the way of push 1"
 
