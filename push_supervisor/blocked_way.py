@@ -9,8 +9,9 @@ import numpy as np
 from push_model.arrays import Array
 from push_model.outlines import distance, inside
 from push_model.push_segment import PushSegment
-from push_supervisor.events import WayBlocked
-from push_supervisor.machine import Machine, State
+from push_supervisor.events import MotionFailed, WayBlocked
+from push_supervisor.machine import Machine
+from push_supervisor.state import State
 from push_supervisor.surroundings import Surroundings
 
 _KEEP = 0.005  # [m] between a body and robot or object, less than plans keep
@@ -93,8 +94,8 @@ class BlockedWay:
 
     def look(
         self, near: Surroundings, robot: Array | None, item: Array | None, bodies: Array
-    ) -> WayBlocked | None:
-        """What ends the plan now, if anything does.
+    ) -> WayBlocked | MotionFailed | None:
+        """What ends the plan now, if anything does: others on its way, or the push itself.
 
         Parameters
         ----------
@@ -106,7 +107,7 @@ class BlockedWay:
         if pushing and robot is not None and item is not None:
             drift = near.drift(machine.segment, robot, item)
             if drift:
-                return WayBlocked(drift)
+                return MotionFailed(drift)
         found = None
         watched = machine.state in _WATCHED or machine.plan_ready
         if watched and machine.remaining and item is not None and len(bodies):

@@ -3,7 +3,8 @@
 from push_model.arrays import Array
 from push_supervisor import motions
 from push_supervisor.events import ObjectMoved
-from push_supervisor.machine import Machine, State
+from push_supervisor.machine import Machine
+from push_supervisor.state import State
 
 PERIOD = 0.1
 """[s] between looks, about."""

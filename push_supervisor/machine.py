@@ -10,7 +10,6 @@ goal ends with this push: the robot stays at the object, and backs off when the 
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from enum import IntEnum
 
 from push_model.arrays import Array
 from push_model.jobs import JobError
@@ -19,17 +18,7 @@ from push_supervisor import commands, events
 from push_supervisor.commands import Command
 from push_supervisor.events import Event
 from push_supervisor.settings import SupervisorSettings
-
-
-class State(IntEnum):
-    """S1-S6 of Fig. 2.24b."""
-
-    IDLE = 1
-    PLANNING = 2
-    POSITIONING = 3
-    APPROACH = 4
-    PUSHING = 5
-    DETACHING = 6
+from push_supervisor.state import MOVING, State
 
 
 @dataclass
@@ -104,8 +93,8 @@ class Machine:
                 self._abort(event.code, event.message)
             case events.MapChanged():
                 self._on_map(event.problem)
-            case events.WayBlocked():
-                self._on_blocked(event.message)
+            case events.WayBlocked() if state is not State.PLANNING:
+                self._on_others(event.message)
             case events.ExecuteCommanded() if state is State.IDLE:
                 self._on_execute()
             case events.PlanFound() if state is State.PLANNING:
@@ -116,9 +105,9 @@ class Machine:
                 self._on_path(event)
             case events.PathFailed() if state is State.POSITIONING:
                 self._on_path_failed(event)
-            case events.MotionDone() if state in _MOVING:
+            case events.MotionDone() if state in MOVING:
                 self._on_motion_done()
-            case events.MotionFailed() if state in _MOVING:
+            case events.MotionFailed() if state in MOVING:
                 self._on_motion_failed(event)
             case events.ObjectMoved() if state in (State.POSITIONING, State.APPROACH):
                 self._on_moved(event.message)
@@ -379,6 +368,14 @@ class Machine:
             self._say(commands.Stop())
             self._position("the map has changed")
 
+    def _on_others(self, problem: str) -> None:
+        """New plans because of others are bounded like waits for them, not like setbacks."""
+        if self.busy and not self._may_wait():
+            self._give_up(JobError.EXECUTION_FAILED, problem)
+        else:
+            self._renew()
+            self._on_blocked(problem)
+
     def _on_blocked(self, problem: str) -> None:
         """What is left of the plan cannot be done; one that is being made is the planner's."""
         if self.plan_ready:
@@ -387,7 +384,7 @@ class Machine:
             self._recovering, self._backing_off = self._recovering or problem, ""
         elif self.state is State.PUSHING:
             self._retreat(problem)
-        elif self.state in _MOVING:
+        elif self.state in MOVING:
             self._say(commands.Stop())
             self._replan(problem)
 
@@ -395,6 +392,3 @@ class Machine:
         self._halt()
         if self.busy or self.segments:
             self._finish(code, message)
-
-
-_MOVING = frozenset({State.POSITIONING, State.APPROACH, State.PUSHING, State.DETACHING})

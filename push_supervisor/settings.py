@@ -60,7 +60,8 @@ class SupervisorSettings:
         10,
         low=0,
         high=10000,
-        doc="Maximum number of waits in a row for other bodies to clear the way of the robot.",
+        doc="Maximum number in a row of waits for other bodies to clear the way of the robot, and "
+        "of new plans because one of them stands on the way of a push.",
     )
     wait: float = bounded(
         3.0,

@@ -34,7 +34,7 @@ from push_study.job import digest, run_job
 from push_study.pool import Row
 from push_study.study import StudyOptions
 from push_study.uncertainty import uncertainty
-from push_supervisor.machine import State
+from push_supervisor.state import State
 from push_view.bodies import bodies_of
 
 SCENARIOS = ("three-push",)

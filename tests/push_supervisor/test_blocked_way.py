@@ -12,7 +12,7 @@ from push_model.outlines import distance, inside
 from push_model.specs import BoxSpec, EnvironmentSpec
 from push_supervisor import SupervisorSettings, Surroundings
 from push_supervisor.blocked_way import BlockedWay, obstruction
-from push_supervisor.machine import State
+from push_supervisor.state import State
 
 DRIVE = DifferentialDrive(0.0205, 0.0265, 6.28)
 

@@ -464,3 +464,13 @@ def test_invariants_of_any_walk(events, automatic, there, touching):
         if Finish in out and machine.state is State.IDLE:
             assert not machine.busy and machine.segments == []
         assert machine.reason
+
+
+def test_bodies_on_the_way_cost_no_setback_but_not_without_end():
+    machine, _ = make(max_replans=1, max_waits=6)
+    walk(machine, GOAL, planned(0))
+    for _ in range(6):
+        assert commands(machine.handle(WayBlocked("a body"))) == [Stop, MakePlan]
+        walk(machine, planned(0))
+    out = walk(machine, WayBlocked("a body"))
+    assert commands(out) == [Stop, Finish] and out[1].code is JobError.EXECUTION_FAILED
