@@ -24,7 +24,7 @@ from push_planner.push_plan import (
 )
 from push_planner.push_reference import push_reference
 from push_planner.push_search import PushSearch
-from push_planner.refusal import check_pose, check_room, why_not
+from push_planner.refusal import check_pose, check_room, check_way, sides_shut_off, why_not
 from push_planner.scene import PushScene
 from push_planner.settings import PlannerSettings
 from push_planner.thesis_search import ThesisSearch, poses_on
@@ -173,6 +173,7 @@ class PushPlanner:
         self.check(goal, "goal", PlanError.GOAL_OCCUPIED)
         check_room(self.scene, start, "pushed away from the start", True)
         check_room(self.scene, goal, "pushed into the goal")
+        check_way(self.scene, start, robot)
         ends = start, goal
         start, goal = (self.scene.item.mass_pose(pose) for pose in ends)
         guides = _Guides(self._guides(start, goal, work.seed), work, settings.rrt_iterations)
@@ -270,6 +271,11 @@ class PushPlanner:
         widest = max(guide.clearance for guide in guides)
         ways = work.ways_out, work.ways_in
         reason = why_not(self.scene, *ends, work.statistics, ways, work.poses, widest)
+        shut, sides = sides_shut_off(self.scene, ends[0], work.robot)
+        if shut:
+            reason += (
+                f"; the robot has no way to {shut} of {sides} sides of the object at the start"
+            )
         return PlanningFailed(PlanError.NO_PUSH_SEQUENCE, reason)
 
     def _as_printed(self, ends: _Ends, guide: GuidePath, work: _Work) -> Iterator[Progress]:

@@ -7,10 +7,12 @@ Poses ``(3,)`` are of the object's geometric frame.
 
 import numpy as np
 
+from push_model import se2
 from push_model.arrays import Array
 from push_planner.guide_path import origin_floor
 from push_planner.push_graph import SearchStatistics
 from push_planner.push_plan import PlanError, PlanningFailed
+from push_planner.robot_path import has_way
 from push_planner.scene import PushScene
 
 
@@ -63,6 +65,31 @@ def check_room(scene: PushScene, pose: Array, what: str, leaving: bool = False) 
             f"no side of the object can be {what} {_told(pose)}: behind each side the robot "
             f"would touch an obstacle. It needs a clearance of {around:.1f} mm and room to back "
             f"off: {behind}. Clear this space, or choose another pose",
+        )
+
+
+def sides_shut_off(scene: PushScene, start: Array, robot: Array | None) -> tuple[int, int]:
+    """To how many sides of the object at a pose the robot ``(3,)`` has no way, of how many that
+    have room behind them."""
+    centre = scene.item.mass_pose(start)
+    outline, leaving = se2.transform(centre, scene.shape.outline), scene.leaving(centre)
+    begins = [(side.robot_pose(centre), side) for side in scene.sides]
+    ends = [scene.standoff(b, s) for b, s in begins if scene.has_room(b, s, leaving)]
+    if robot is None:
+        return 0, len(ends)
+    ways = (scene.field, scene.robot, scene.settings, robot)
+    return sum(not has_way(*ways, end, outline) for end in ends), len(ends)
+
+
+def check_way(scene: PushScene, start: Array, robot: Array | None) -> None:
+    """Raise PlanningFailed if the robot ``(3,)`` has no way to any side of the object."""
+    shut, sides = sides_shut_off(scene, start, robot)
+    if robot is not None and shut == sides:
+        passage = 2.0 * (scene.robot.footprint_radius + scene.settings.safety_distance)
+        raise PlanningFailed(
+            PlanError.NO_PUSH_SEQUENCE,
+            f"the robot at {_told(robot)} has no way to any side of the object on which it could "
+            f"push; it needs passages of at least {passage:.3f} m",
         )
 
 

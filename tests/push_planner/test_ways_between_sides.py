@@ -5,7 +5,7 @@ import pytest
 
 from push_model import se2
 from push_model.occupancy import rasterise
-from push_model.specs import EnvironmentSpec
+from push_model.specs import BoxSpec, EnvironmentSpec
 from push_planner import PlanError, PlannerSettings, PlanningFailed, PushPlanner
 from push_planner.bodies import with_bodies
 from push_planner.robot_path import has_way
@@ -49,6 +49,7 @@ def test_a_robot_that_cannot_pass_the_object_does_not_plan_to_push_it_back(robot
         with pytest.raises(PlanningFailed) as refusal:
             solved(planner, start, np.array(goal), here)
         assert refusal.value.code is PlanError.NO_PUSH_SEQUENCE
+        assert "the robot has no way to " in str(refusal.value)
     wide = PushPlanner(SETTINGS, rasterise(WIDE), robot, box)
     plan = solved(wide, start, np.array(goal), here)
     assert refused_changes(wide, plan, here) == 0
@@ -81,3 +82,13 @@ def test_plans_beside_a_body_never_ask_for_a_way_that_the_robot_does_not_have(mo
         assert refused_changes(planner, plan, here) == 0, number
     print(f"{blind} of 8 without a way where nobody looks; {solvable} with plans where one does")
     assert blind >= 3 and solvable >= 6
+
+
+def test_a_robot_that_is_shut_off_is_told_so_at_once(robot, box):
+    """A wall stands between the robot and the box."""
+    room = EnvironmentSpec((3.0, 1.0), boxes=(BoxSpec((-0.3, 0.0), (0.05, 1.0)),))
+    planner = PushPlanner(SETTINGS, rasterise(room), robot, box)
+    here, start, goal = np.array([-0.8, 0.0, 0.0]), np.array([0.5, 0, 0]), np.array([1.0, 0, 0])
+    with pytest.raises(PlanningFailed, match="has no way to any side of the object"):
+        next(planner.plan(start, goal, robot=here))
+    assert len(solved(planner, start, goal, np.array([0.2, 0.3, 0.0])).segments) == 1
