@@ -273,9 +273,7 @@ class PushPlanner:
         reason = why_not(self.scene, *ends, work.statistics, ways, work.poses, widest)
         shut, sides = sides_shut_off(self.scene, ends[0], work.robot)
         if shut:
-            reason += (
-                f"; the robot has no way to {shut} of {sides} sides of the object at the start"
-            )
+            reason += f"; the robot has no way to {shut} of the {sides} sides that have room"
         return PlanningFailed(PlanError.NO_PUSH_SEQUENCE, reason)
 
     def _as_printed(self, ends: _Ends, guide: GuidePath, work: _Work) -> Iterator[Progress]:

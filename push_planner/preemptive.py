@@ -17,6 +17,7 @@ from push_planner.planner import PushPlanner
 from push_planner.push_curve import shortest_push_curve
 from push_planner.push_graph import PushStep
 from push_planner.push_plan import PlanError, PlanningFailed, Progress, PushPlan
+from push_planner.refusal import check_way
 from push_planner.robot_path import has_way
 
 
@@ -88,6 +89,7 @@ def plan_after_preemptive_push(
     """
     planner.check(start, "start", PlanError.START_OCCUPIED)
     planner.check(goal, "goal", PlanError.GOAL_OCCUPIED)
+    check_way(planner.scene, start, robot)
     offers = preemptive_pushes(planner, start, goal, seed, robot=robot)
     offers = offers[: planner.settings.max_preemptive]
     yield Progress("pre-emptive pushes", None)
