@@ -28,7 +28,7 @@ def _one_robot() -> None:
     import numpy as np
 
     from push_mpc import LtvMpc, MpcSettings, TrackerSettings, TrajectoryTracker
-    from push_planner import PlannerSettings, PushPlanner
+    from push_planner import PlannerSettings, PushPlanner, warm_up
     from push_scenario.scenario import load_scenario
     from sim_bridge.planar_world import PlanarWorld
 
@@ -38,6 +38,7 @@ def _one_robot() -> None:
     TrajectoryTracker(TrackerSettings(), LtvMpc(MpcSettings(), robot.differential)).warm_up()
     start = next(iter(scenario.objects.values()))[1]
     goal = scenario.goal if scenario.goal is not None else np.zeros(3)
+    warm_up(PlannerSettings(), robot, item)
     PushPlanner(PlannerSettings(), scenario.grid, robot, item).solve(start, goal)
     with PlanarWorld(scenario.environment, scenario.robots, scenario.objects) as world:
         world.step(2)

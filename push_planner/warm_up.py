@@ -1,5 +1,6 @@
 """Load what is compiled before the first request."""
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from push_model.occupancy import OccupancyGrid
 from push_model.specs import ObjectSpec, RobotSpec
 from push_planner.planner import PushPlanner
+from push_planner.robot_path import NoRobotPath, plan_robot_path
 from push_planner.settings import PlannerSettings
 
 _HALF = 1.5  # [m] of the map, and more for large bodies
@@ -14,11 +16,18 @@ _CELL = 0.02  # [m]
 
 
 def warm_up(settings: PlannerSettings, robot: RobotSpec, item: ObjectSpec) -> None:
-    """Plan a short push on a small map. Raises PlanningFailed, which means no harm."""
+    """Plan a short push, and a way of the robot from beside a wall, on a small map. Raises
+    PlanningFailed, which means no harm."""
     half = _HALF + 4.0 * (robot.body_radius + item.geometry.circumradius)
     cells = int(2.0 * half / _CELL)
     occupied = np.zeros((cells, cells), dtype=bool)
     occupied[[0, -1]] = occupied[:, [0, -1]] = True
     grid = OccupancyGrid(occupied, _CELL, np.full(2, -half))
     quick = replace(settings, improvement_rounds=0, rrt_iterations=50, max_expansions=2)
-    PushPlanner(quick, grid, robot, item).solve(np.zeros(3), np.array([0.3, 0.0, 0.0]))
+    planner = PushPlanner(quick, grid, robot, item)
+    planner.solve(np.zeros(3), np.array([0.3, 0.0, 0.0]))
+    near = half - _CELL - robot.footprint_radius - 0.5 * settings.safety_distance
+    beside, away = np.array([-near, 0.0, 0.0]), np.array([0.5 * half, 0.5 * half, 1.0])
+    circles = np.array([[0.0, 0.0, robot.footprint_radius]])
+    with suppress(NoRobotPath):
+        plan_robot_path(planner.scene.field, robot, settings, beside, away, circles)
