@@ -127,17 +127,41 @@ class Spinner:
             self.once(0.05)
         return True
 
+    def add(self, node: Node) -> None:
+        """Spin this node, too."""
+        self.nodes.append(node)
+        self.executor.add_node(node)
+
+    def remove(self, node: Node) -> None:
+        """Take a node out while the others go on; destroy it.
+
+        The executor drops a node at its next event. Events that were queued before, and timers that
+        these find due, are still handled; they raise InvalidHandle when the node is destroyed.
+        """
+        self.executor.remove_node(node)
+        for _ in range(2):  # events are handled in their order: what is queued now; what it queued
+            handled = self.executor.create_task(lambda: None)
+            while not handled.done():
+                self.once(0.05)
+        self.nodes.remove(node)
+        _destroy(node)
+
     def close(self) -> None:
         """Destroy the nodes. An executor that is left open keeps them in the graph."""
         for node in self.nodes:
             self.executor.remove_node(node)
-            for waitable in list(node.waitables):  # of which rclpy forgets those of actions
-                if isinstance(waitable, (ActionClient, ActionServer)):
-                    waitable.destroy()
-            with contextlib.suppress(Exception):
-                node.destroy_node()
+            _destroy(node)
         self.nodes.clear()
         self.executor.shutdown()
+
+
+def _destroy(node: Node) -> None:
+    """Destroy a node that no executor spins."""
+    for waitable in list(node.waitables):  # of which rclpy forgets those of actions
+        if isinstance(waitable, (ActionClient, ActionServer)):
+            waitable.destroy()
+    with contextlib.suppress(Exception):
+        node.destroy_node()
 
 
 def run_node(make: Callable[[], Node], arguments: Sequence[str] | None = None) -> int:

@@ -92,6 +92,25 @@ def test_an_executor_where_standard_error_is_no_file(ros, monkeypatch):
     spinner.close()
 
 
+def test_a_node_is_taken_out_while_its_events_are_under_way(ros):
+    """None of its callbacks is called after it is destroyed, which would raise InvalidHandle."""
+    spinner = Spinner([rclpy.create_node("stays")])
+    ticks = []
+    for number in range(20):
+        node = rclpy.create_node(f"leaves_{number}")
+        for _ in range(4):  # they are due together, and a spin ends after one of them
+            node.create_timer(1e-3, lambda node=node: ticks.append(node.count_publishers("/text")))
+        spinner.add(node)
+        told = len(ticks)
+        enough = told + number
+        assert spinner.until(lambda enough=enough: len(ticks) > enough, 10.0)
+        spinner.remove(node)
+        told = len(ticks)
+        assert not spinner.until(lambda told=told: len(ticks) > told, 0.01)
+    assert [n.get_name() for n in spinner.nodes] == ["stays"]
+    spinner.close()
+
+
 def test_what_is_latched_is_heard_by_who_comes_late(ros):
     node = rclpy.create_node("speaker")
     publisher = node.create_publisher(String, "/text", LATCHED)

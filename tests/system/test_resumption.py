@@ -38,21 +38,14 @@ def running(monkeypatch, system):
 
 def die(run):
     """The owner of the job is gone without a word."""
-    node = run.supervisor
-    node._poses._on_frame = lambda frame: None  # one may be in the queue
-    run.spinner.executor.remove_node(node)
-    run.spinner.nodes.remove(node)
-    for server in (node._intake._server, *(s._server for s in node._servers)):
-        server._server.destroy()
-    node.destroy_node()
+    run.spinner.remove(run.supervisor)
 
 
 def respawn(run):
     """Another one in its place."""
     (spec,) = (s for s in nodes_of(run.system, run.scenario, "") if s.traits.owner)
     run.supervisor = run.teams[""].supervisor = node = spec.make(run.scenario)
-    run.spinner.nodes.append(node)
-    run.spinner.executor.add_node(node)
+    run.spinner.add(node)
     run.observer.state = None
     assert run.spin_until(lambda: run.observer.state is not None, 30.0)
 

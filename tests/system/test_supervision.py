@@ -178,13 +178,11 @@ def test_a_robot_at_the_object_loses_no_planning_round(run, way):
         run.call(Trigger, "/cancel", Trigger.Request())
         assert run.ends().error_code == JobError.CANCELED
     elif way == "new supervisor":  # FAULTS 11: the one before died and left the robot there
-        run.run.spinner.executor.remove_node(run.run.supervisor)
-        run.run.supervisor.destroy_node()
+        run.run.spinner.remove(run.run.supervisor)
         run.until(lambda: not run.run.controller.tracker.active, 5.0)
         born = SupervisorNode(run.run.scenario)
         run.run.supervisor = born
-        run.run.spinner.nodes.append(born)
-        run.run.spinner.executor.add_node(born)
+        run.run.spinner.add(born)
         run.record()
         run.until(lambda: born.ready and run.state.job == 0, 10.0)
         assert run.run.spinner.until(lambda: run.topic.get_subscription_count() == 1, 10.0)
