@@ -24,7 +24,7 @@ from push_model.jobs import JobError
 from push_model.settings import SettingsError
 from push_msgs.msg import JobState
 from push_record.recorder import RecorderNode
-from push_ros.claims import claim_domain
+from push_ros.claims import claim_domain, claim_world
 from push_ros.names import Names, space
 from push_ros.pace_feed import pace_known
 from push_ros.process import Spinner, prepare_environment
@@ -97,6 +97,10 @@ class LockstepRun:
         system: which nodes, see ``push_bringup.systems``. namespace: of the world.
         record: folder of a bag from which ``planar-push rerun`` can repeat the run.
         about: further metadata of that bag.
+
+        Raises
+        ------
+        SettingsError: the scenario is for a lab, or another run is open in this ROS domain.
         """
         prepare_environment()
         if quiet:
@@ -118,6 +122,7 @@ class LockstepRun:
             self._stack.callback(rclpy.try_shutdown)
         nodes: list[Node] = []
         try:
+            self._claim()
             made: dict[str, Any] = {}
             for spec in specs:
                 made[spec.name] = spec.make(simulated if spec.kind == "bridge" else self.scenario)
@@ -153,6 +158,16 @@ class LockstepRun:
         self._listeners = sum(s.traits.listens for s in specs)
         self.nodes = tuple(nodes)
         self.spinner = Spinner(nodes)
+
+    def _claim(self) -> None:
+        """Only one run in a namespace of a domain: two would answer each other's frames."""
+        domain = str(rclpy.get_default_context().get_domain_id())
+        claim = claim_world(domain, self._names.world_space)
+        if claim is None:
+            raise SettingsError(
+                f"a bridge already runs in domain {domain}; close it, or set another ROS_DOMAIN_ID"
+            )
+        self._stack.callback(claim.close)
 
     def __enter__(self) -> "LockstepRun":
         return self

@@ -28,7 +28,7 @@ def pushing(run, goal, limit=120.0):
     run.spin_until(lambda: run.bridge.time > begin + 0.5, 2.0)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def single():
     scenario = load_scenario("short")
     with LockstepRun(scenario, quiet=True) as run:
@@ -56,6 +56,7 @@ def test_planner_and_controller_take_up_a_friction(single):
 
 def test_what_cannot_be_believed_is_refused_and_changes_nothing(single):
     item = next(iter(single.scenario.objects))
+    tell(single, {(item, "contact_friction"): (0.3, 0.2, 0.4)})
     before = single.planner._beliefs.current
     message = belief_to_ros("person", {(item, "contact_friction"): Interval.exact(0.3)})
     for field, value in (

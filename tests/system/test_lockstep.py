@@ -16,6 +16,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
+from push_model.settings import SettingsError
 from push_msgs.action import MoveObject
 from push_msgs.msg import JobState
 from push_ros import pace_feed
@@ -440,3 +441,15 @@ def test_cancelled_action_reports_canceled(short):
     answer = unknown.result().get_result_async()
     assert short.spin_until(answer.done, 5.0)
     assert answer.result().result.error_code == MoveObject.Result.UNKNOWN_OBJECT
+
+
+def test_a_second_run_in_the_same_domain_is_refused():
+    """They would answer each other's frames."""
+    scenario = load_scenario("short")
+    with LockstepRun(scenario, quiet=True) as run:
+        with pytest.raises(SettingsError, match="a bridge already runs in domain"):
+            LockstepRun(scenario, quiet=True)
+        run.start()
+        assert run.spin_until(lambda: run.bridge.time > 0.1, 5.0), "the first one goes on"
+    with LockstepRun(scenario, quiet=True):
+        pass
