@@ -1,7 +1,8 @@
 """The two layers together: from start and goal pose to a plan of pushes that keeps improving."""
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from push_model.occupancy import OccupancyGrid
 from push_model.push_segment import PushSegment
 from push_model.specs import ObjectSpec, RobotSpec
 from push_planner.candidate_poses import along_guide, manoeuvres, nearby, runs, scattered
+from push_planner.cost_bound import CostBound
 from push_planner.guide_path import GuidePath, NoGuidePath, guide_paths, origin_floor
 from push_planner.narrow_way import lined_up
 from push_planner.push_graph import PushGraph, PushStep, SearchStatistics
@@ -45,6 +47,7 @@ class _Work:
         self.random = np.random.default_rng(seed)
         self.statistics = SearchStatistics()
         self.iterations = self.poses = 0
+        self.least = 0.0  # [m] lower bound of the cost of a plan
         self.ways_out = self.ways_in = False  # whether any push leaves the start, ends at the goal
         self.left = settings.total_expansions
         self._most = settings.max_expansions
@@ -128,21 +131,11 @@ class PushPlanner:
         check_pose(self.scene, pose, what, occupied)
 
     def lower_bound(self, start: Array, goal: Array) -> float:
-        """[m] that no plan can cost less than.
-
-        While the robot drives 1 m the object's centre, ``ahead`` of the axle midpoint, moves
-        sqrt((1 - kappa y)^2 + (kappa ahead)^2) m; no shorter than straight, with one push.
-        """
+        """[m] that no plan can cost less than, without the work on two runs (cost_bound.py)."""
         if not self.scene.sides:
             return np.inf
-        fastest = max(
-            np.hypot(1.0 - kappa * side.grasp[1], kappa * side.grasp[0])
-            for side in self.scene.sides
-            for kappa in (side.trusted.minimum, side.trusted.maximum)
-        )
-        item = self.scene.item
-        straight = float(np.hypot(*(item.mass_pose(goal) - item.mass_pose(start))[:2]))
-        return straight / float(max(fastest, 1.0)) + self.settings.push_cost
+        start, goal = (self.scene.item.mass_pose(pose) for pose in (start, goal))
+        return float(CostBound(self.scene, start, goal, np.inf).value)
 
     def plan(
         self,
@@ -157,9 +150,9 @@ class PushPlanner:
         thorough: whether a long search follows where the others find no plan. robot: ``(3,)`` pose
         of the robot, from which it must have a way to the first side; None if unknown.
 
-        The last report carries the best plan, and a plan that is reported never costs more than
-        one before it. The work is counted, never timed, so that equal inputs and seeds give equal
-        plans.
+        The last report carries the best plan, with the lower bound of all costs. A plan that is
+        reported never costs more than one before it. The work is counted, never timed, so that
+        equal inputs and seeds give equal plans.
 
         Raises
         ------
@@ -179,16 +172,22 @@ class PushPlanner:
         guides = _Guides(self._guides(start, goal, work.seed), work, settings.rrt_iterations)
         yield Progress("guide path", None)
         guides.number(0)
-        if settings.planner == "thesis":
-            yield from self._as_printed(ends, min(guides.all(), key=lambda g: g.cost), work)
-            return
+        work.least = self.lower_bound(*ends)
         best: PushPlan | None = None
-        for progress in self._first_plan(ends, guides, work, thorough):
-            best = progress.best
-            yield progress
-        if best is None:
-            raise self._refusal(ends, guides.all(), work)
-        yield from self._improved(best, ends, guides, work)
+        if settings.planner == "thesis":
+            best = yield from self._as_printed(ends, min(guides.all(), key=lambda g: g.cost), work)
+        else:
+            for progress in self._first_plan(ends, guides, work, thorough):
+                best = progress.best
+                yield progress
+            if best is None:
+                raise self._refusal(ends, guides.all(), work)
+            best = yield from self._improved(best, ends, guides, work)
+        bound = CostBound(self.scene, start, goal, best.cost)
+        for _ in bound.run(settings.bound_boxes):
+            yield Progress("lower bound of the cost", best)
+        statistics = work.counted(best.guide)
+        yield Progress("done", replace(best, cost_bound=bound.value, statistics=statistics))
 
     def _first_plan(
         self, ends: _Ends, guides: _Guides, work: _Work, thorough: bool
@@ -236,15 +235,15 @@ class PushPlanner:
 
     def _improved(
         self, best: PushPlan, ends: _Ends, guides: _Guides, work: _Work
-    ) -> Iterator[Progress]:
-        """Search below the cost of the best plan: along another guide path, then near its poses."""
+    ) -> Generator[Progress, None, PushPlan]:
+        """Search below the cost of the best plan: along another guide path, then near its poses.
+        Returns the best plan."""
         settings = self.settings
         start, goal = (self.scene.item.mass_pose(pose) for pose in ends)
-        least = self.lower_bound(*ends)
         work.left = settings.improvement_expansions
         for number in range(settings.improvement_rounds):
             bound = (1.0 - _WORTH) * best.cost
-            if work.left <= 0 or bound <= least:
+            if work.left <= 0 or bound <= work.least:
                 break
             if number == 0:
                 count, most = settings.improvement_poses, settings.improvement_expansions // 2
@@ -265,7 +264,7 @@ class PushPlanner:
             if search.solution is not None and search.cost < best.cost:
                 best = self._assemble(search, ends[1], best.guide, work)
                 yield Progress("improving", best)
-        yield Progress("done", best)
+        return best
 
     def _refusal(self, ends: _Ends, guides: Sequence[GuidePath], work: _Work) -> PlanningFailed:
         widest = max(guide.clearance for guide in guides)
@@ -276,7 +275,9 @@ class PushPlanner:
             reason += f"; the robot has no way to {shut} of the {sides} sides that have room"
         return PlanningFailed(PlanError.NO_PUSH_SEQUENCE, reason)
 
-    def _as_printed(self, ends: _Ends, guide: GuidePath, work: _Work) -> Iterator[Progress]:
+    def _as_printed(
+        self, ends: _Ends, guide: GuidePath, work: _Work
+    ) -> Generator[Progress, None, PushPlan]:
         """Layer 2 of the thesis: poses on Gamma alone, and no improvement."""
         start, goal = (self.scene.item.mass_pose(pose) for pose in ends)
         poses = poses_on(self.scene, guide).free(self.scene)
@@ -288,7 +289,7 @@ class PushPlanner:
         work.ways_out = work.ways_in = True
         if search.solution is None:
             raise self._refusal(ends, [guide], work)
-        yield Progress("done", self._assemble(search, ends[1], guide, work))
+        return self._assemble(search, ends[1], guide, work)
 
     def _graph(
         self,
@@ -373,4 +374,5 @@ class PushPlanner:
         assert search.solution is not None
         segments = tuple(self.segment(step) for step in search.solution)
         clearance = min(s.clearance for s in segments)
-        return PushPlan(goal, segments, search.cost, clearance, guide, work.counted(guide))
+        least, counted = min(work.least, search.cost), work.counted(guide)
+        return PushPlan(goal, segments, search.cost, least, clearance, guide, counted)

@@ -93,6 +93,7 @@ def plan_after_preemptive_push(
     offers = preemptive_pushes(planner, start, goal, seed, robot=robot)
     offers = offers[: planner.settings.max_preemptive]
     yield Progress("pre-emptive pushes", None)
+    least = planner.lower_bound(start, goal)
     failure = "no push away from the start was found"
     for number, offer in enumerate(offers, 1):
         stage = f"after pre-emptive push {number} of {len(offers)}"
@@ -103,9 +104,11 @@ def plan_after_preemptive_push(
             after = se2.compose(offer.robot_end, back)
             plans = planner.plan(offer.object_end, goal, thorough=False, robot=after)
             for progress in plans:
-                if progress.best is not None and progress.best is not rest:
+                if progress.best is not None and (
+                    rest is None or progress.best.segments is not rest.segments
+                ):
                     rest = progress.best
-                    whole = _preceded(planner, offer, rest)
+                    whole = _preceded(planner, offer, rest, least)
                 yield Progress(f"{stage}: {progress.stage}", whole)
             return
         except PlanningFailed as error:
@@ -116,12 +119,14 @@ def plan_after_preemptive_push(
     )
 
 
-def _preceded(planner: PushPlanner, first: PushSegment, plan: PushPlan) -> PushPlan:
-    """A plan with a push before it, at the cost that the search would give it."""
+def _preceded(planner: PushPlanner, first: PushSegment, plan: PushPlan, least: float) -> PushPlan:
+    """A plan with a push before it, at the cost that the search would give it. least: [m] bound of
+    the cost of any plan."""
     following = plan.segments[0]
     cost = plan.cost + first.length + planner.settings.push_cost
     if following.side != first.side:
         way = float(np.hypot(*(following.robot_start - first.robot_end)[:2]))
         cost += way + planner.settings.side_change_cost
     clearance = min(first.clearance, plan.clearance)
-    return replace(plan, segments=(first, *plan.segments), cost=cost, clearance=clearance)
+    segments = (first, *plan.segments)
+    return replace(plan, segments=segments, cost=cost, cost_bound=least, clearance=clearance)

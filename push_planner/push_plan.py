@@ -45,7 +45,8 @@ class PlanStatistics:
 
 @dataclass(frozen=True)
 class PushPlan:
-    """cost [m]: g(q) of (2.10); length [m] of all pushes; clearance [m]; the guide path used.
+    """cost [m]: g(q) of (2.10); cost_bound [m]: no plan costs less, see cost_bound.py; clearance
+    [m]; the guide path used.
 
     goal ``(3,)`` and the segments' poses are of the object's geometric frame, the guide path is of
     its centre of mass.
@@ -54,6 +55,7 @@ class PushPlan:
     goal: Array
     segments: tuple[PushSegment, ...]
     cost: float
+    cost_bound: float
     clearance: float
     guide: GuidePath
     statistics: PlanStatistics

@@ -102,6 +102,13 @@ class PlannerSettings:
         doc="Distance by which searches after the first plan move the poses of the best plan "
         "(m); halved every two rounds",
     )
+    bound_boxes: int = bounded(
+        2000,
+        low=0,
+        high=10000000,
+        doc="Maximum number of boxes that are divided to raise the lower bound of the cost of the "
+        "final plan",
+    )
     push_cost: float = bounded(
         0.05, low=0.0, high=10.0, doc="Cost of each push in addition to its length (m)"
     )

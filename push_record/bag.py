@@ -15,6 +15,7 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
 from push_record.interfaces import typestore
+from push_record.older_messages import OlderMessages
 
 _CHUNK = 64 * 1024  # [bytes]
 _FLUSH_EVERY = 1.0  # [s] wall time
@@ -226,7 +227,8 @@ def read_channels(bag: Path) -> list[tuple[str, str, bool]]:
 
 
 def read_bag(bag: Path, topics: set[str] | None = None) -> Iterator[Record]:
-    """Messages in file order; of a truncated bag, those of its complete chunks."""
+    """Messages in file order; of a truncated bag, those of its complete chunks. Those of another
+    version of this project are converted (older_messages.py)."""
     store = typestore()
     for raw in read_raw(bag, topics):
         yield Record(raw.topic, raw.stamp, store.deserialize_cdr(raw.data, raw.type))
@@ -234,36 +236,41 @@ def read_bag(bag: Path, topics: set[str] | None = None) -> Iterator[Record]:
 
 def read_raw(bag: Path, topics: set[str] | None = None) -> Iterator[RawRecord]:
     """As ``read_bag``, without deserialising."""
+    older = OlderMessages()
     schemas: dict[int, str] = {}
     channels: dict[int, tuple[str, str]] = {}
     for record in _records(bag):
         if isinstance(record, Schema):
             schemas[record.id] = record.name
+            older.define(record.name, record.data.decode(errors="replace"))
         elif isinstance(record, Channel):
             channels[record.id] = (record.topic, schemas[record.schema_id])
         elif isinstance(record, Message):
             topic, kind = channels[record.channel_id]
             if topics is None or topic in topics:
-                yield RawRecord(topic, kind, record.log_time, record.data)
+                data = older.present(kind, record.data)
+                yield RawRecord(topic, kind, record.log_time, data)
+
+
+def older_types(bag: Path) -> list[str]:
+    """Message types whose definition in the bag is not the present one."""
+    older = OlderMessages()
+    for record in _records(bag):
+        if isinstance(record, Schema):
+            older.define(record.name, record.data.decode(errors="replace"))
+    return sorted(older.types)
 
 
 def recover(bag: Path, folder: Path) -> int:
     """Copy the readable part of a truncated bag into a new one; returns the message count."""
     writer = BagWriter(folder, read_metadata(bag))
-    schemas: dict[int, str] = {}
-    names: dict[int, str] = {}
     count = 0
     try:
-        for record in _records(bag):
-            if isinstance(record, Schema):
-                schemas[record.id] = record.name
-            elif isinstance(record, Channel) and record.id not in names:
-                names[record.id] = record.topic
-                latched = "transient_local" in record.metadata.get("offered_qos_profiles", "")
-                writer.add_topic(record.topic, schemas[record.schema_id], latched)
-            elif isinstance(record, Message):
-                writer.write(names[record.channel_id], record.log_time, record.data)
-                count += 1
+        for topic, kind, latched in read_channels(bag):
+            writer.add_topic(topic, kind, latched)
+        for record in read_raw(bag):
+            writer.write(record.topic, record.stamp, record.data)
+            count += 1
     finally:
         writer.close()
     return count

@@ -1,7 +1,8 @@
 """Plans as they are drawn: pushes with their sides, and the ways of robots to their places."""
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,12 +23,22 @@ class PlannedPush:
 @dataclass(frozen=True)
 class Plan:
     """time: [s]. ways: name of a robot and its path ``(n, 2)`` [m]. continues: it is the next piece
-    of the plan before, which stays."""
+    of the plan before, which stays. cost, cost_bound: [m] of the plan, and what no plan costs less
+    than; 0 if unknown."""
 
     time: float
     pushes: tuple[PlannedPush, ...]
     ways: tuple[tuple[str, Array], ...] = ()
     continues: bool = False
+    cost: float = 0.0
+    cost_bound: float = 0.0
+
+    @property
+    def gap(self) -> float:
+        """What the cost may be above that of the best plan, at most, as a fraction of the latter;
+        NaN if unknown."""
+        known = 0.0 < self.cost_bound <= self.cost < math.inf
+        return self.cost / self.cost_bound - 1.0 if known else math.nan
 
 
 def from_push_plan(message: Any, time: float) -> Plan:
@@ -40,7 +51,8 @@ def from_push_plan(message: Any, time: float) -> Plan:
         )
         for i, s in enumerate(message.segments)
     ]
-    return Plan(time, tuple(p for p in pushes if len(p.path)))
+    drawn = tuple(p for p in pushes if len(p.path))
+    return Plan(time, drawn, cost=float(message.cost), cost_bound=float(message.cost_bound))
 
 
 def from_group_plan(message: Any, time: float, number: int) -> Plan:
@@ -70,7 +82,7 @@ def merged(plans: Sequence[Plan]) -> Plan | None:
     kept = plans[first:]
     if not kept:
         return None
-    return Plan(kept[-1].time, tuple(q for p in kept for q in p.pushes), kept[-1].ways)
+    return replace(kept[-1], pushes=tuple(q for p in kept for q in p.pushes), continues=False)
 
 
 def _points(x: Sequence[float], y: Sequence[float]) -> Array:

@@ -219,7 +219,7 @@ def plan_to_ros(plan: Any, robot: str, item: str, seconds: float) -> PlanMessage
     message.header.frame_id = FRAME
     message.header.stamp = time_to_ros(seconds)
     message.cost, message.length = float(plan.cost), float(plan.length)
-    message.clearance = float(plan.clearance)
+    message.cost_bound, message.clearance = float(plan.cost_bound), float(plan.clearance)
     message.segments = [segment_to_ros(s) for s in plan.segments]
     message.statistics = StatisticsMessage(
         **{

@@ -10,6 +10,7 @@ import numpy as np
 
 from push_record.contents import BagContents, Job
 from push_record.faults import Fault, faults_of
+from push_record.planned import merged
 from push_view.html_page import Markup, frame, page, player, table
 from push_view.playback import contents_json
 
@@ -69,8 +70,14 @@ def _results(contents: BagContents, errors: Mapping[str, tuple[float, float]]) -
         pairs = zip(["", *names], names, strict=False)
         pushes = sum(now == "PUSHING" != before for before, now in pairs)
         crew = ", ".join(job.robots) if len(job.robots) <= 5 else f"{len(job.robots)} robots"
-        rows.append((space, job.system, crew, job.object, 1e3 * position, orientation, pushes, end))
-    heads = ("team", "system", "robots", "object", "final error [mm]", "[rad]", "pushes", "end")
+        plan = merged(job.plans)
+        cost, gap = (math.nan, math.nan) if plan is None or not plan.cost else (plan.cost, plan.gap)
+        error = 1e3 * position, orientation
+        rows.append((space, job.system, crew, job.object, *error, pushes, cost, 100.0 * gap, end))
+    heads = (
+        *("team", "system", "robots", "object", "final error [mm]", "[rad]", "pushes"),
+        *("plan cost [m]", "above the best at most [%]", "end"),
+    )
     hits = contents.collisions
     touched = table(
         ("between robots", "robots with walls", "objects with walls", "between objects"),

@@ -3,6 +3,7 @@
 Lengths are metres unless a name says otherwise; points of shapes are integers in millimetres.
 """
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -39,7 +40,9 @@ def plan_json(plan: Plan | None) -> dict[str, Any]:
     """Planned pushes, each with name, colour and path, and the ways of robots to their places."""
     if plan is None:
         return {"pushes": [], "ways": []}
+    told = {} if math.isnan(plan.gap) else {"cost": round(plan.cost, 3), "gap": round(plan.gap, 3)}
     return {
+        **told,
         "pushes": [
             {"name": p.name, "colour": robot_colour(p.number), **_path(p.path)} for p in plan.pushes
         ],

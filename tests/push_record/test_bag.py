@@ -10,9 +10,15 @@ import pytest
 from mcap.reader import make_reader
 from rclpy.serialization import serialize_message
 from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from push_record.bag import BagWriter, bag_file, read_bag, read_metadata, recover
+from push_msgs.msg import PushPlan, PushSegment, Trajectory
+from push_record.bag import BagWriter, bag_file, older_types, read_bag, read_metadata, recover
+from push_record.contents import load
+from push_record.faults import faults_of
+from push_record.interfaces import interface_folder, typestore
 from push_ros.conversions import poses_to_ros
+from push_scenario.scenario import load_scenario
 
 META = {"scenario": "a: 1", "seed": "7"}
 
@@ -82,3 +88,55 @@ def test_full_disk_ends_the_recording_and_nothing_else(tmp_path, monkeypatch):
     writer.abandon()
     writer.close()  # safe afterwards
     assert len(list(read_bag(tmp_path / "bag"))) > 1000
+
+
+def older_store():
+    """The interfaces before plans told the bound of their cost, with a field that is gone."""
+    store = typestore()
+    folder = interface_folder("push_msgs") / "msg"
+    text = (folder / "PushPlan.msg").read_text()
+    assert "float64 cost_bound" in text
+    lines = [line for line in text.splitlines() if not line.startswith("float64 cost_bound")]
+    types = get_types_from_msg("\n".join(["uint8 mood", *lines]), "push_msgs/msg/PushPlan")
+    older = get_typestore(Stores.ROS2_JAZZY)
+    own = {
+        name: ([], fields[1])
+        for name, fields in store.fielddefs.items()
+        if name.startswith("push_msgs/") and name != "push_msgs/msg/PushPlan"
+    }
+    older.register({**own, **types})
+    return older
+
+
+def test_a_bag_of_another_version_is_read_by_the_definitions_that_it_carries(tmp_path, monkeypatch):
+    name, older, present = "push_msgs/msg/PushPlan", older_store(), typestore()
+    plan = PushPlan(object="box", robot="e1", cost=1.5, length=1.25, clearance=0.02)
+    driven = Trajectory(**{k: [0.5, 1.0] for k in ("time", "x", "y", "theta", "v", "omega")})
+    plan.segments = [PushSegment(side=2, length=1.25, trajectory=driven)]
+    new = present.deserialize_cdr(serialize_message(plan), name)
+    kept = {field: getattr(new, field) for field, _ in older.fielddefs[name][1] if field != "mood"}
+    data = older.serialize_cdr(older.types[name](mood=3, **kept), name)
+    monkeypatch.setattr("push_record.bag.typestore", lambda: older)
+    about = {**META, "scenario": load_scenario("short").text}
+    writer = BagWriter(tmp_path / "bag", about)
+    writer.add_topic("/push_plan", name, True)
+    writer.add_topic("/poses", "push_msgs/msg/Poses", False)
+    for k in range(3):
+        writer.write("/push_plan", k * 10**9, bytes(data))
+        writer.write("/poses", k * 10**9, message(k))
+    writer.close()
+    monkeypatch.undo()
+    assert older_types(tmp_path / "bag") == [name]
+    recover(tmp_path / "bag", tmp_path / "anew")
+    assert older_types(tmp_path / "anew") == []
+    for bag in (tmp_path / "bag", tmp_path / "anew"):
+        plans = [r.message for r in read_bag(bag, {"/push_plan"})]
+        assert len(plans) == 3
+        for found in plans:
+            assert (found.object, found.robot, found.cost, found.length) == ("box", "e1", 1.5, 1.25)
+            assert found.cost_bound == 0.0 and found.segments[0].side == 2
+            assert found.segments[0].trajectory.x.tolist() == [0.5, 1.0]
+        poses = [r.message.x[0] for r in read_bag(bag, {"/poses"})]
+        assert poses == [0.0, 0.5, 1.0]
+    told = faults_of(tmp_path / "bag", load(tmp_path / "bag"))
+    assert [(f.kind, f.where) for f in told] == [("another version", name)]

@@ -1,0 +1,247 @@
+"""A lower bound on the cost of every plan between two poses of the object.
+
+Successive pushes on the same side are called a run. In a run the robot drives a curve whose
+curvature is within the limits of that side, so a run is not shorter than the shortest path of
+bounded curvature (dubins_bound.py). Obstacles lengthen it: the object's centre of mass has a least
+distance to them, and it moves at most ``fastest`` times as far as the robot. The cost (2.10) of a
+plan is therefore at least the smallest of these:
+
+- one run: its bound, and the cost of one push;
+- two runs: the smallest sum of two bounds over all poses at which the side is changed, and the
+  costs of two pushes and of one change;
+- three runs or more: the distance that the centre must move, or the length in which the object can
+  turn as far as it must, and the costs of three pushes and of two changes.
+
+The smallest sum over poses is found by branch and bound. A box of positions and headings has a
+bound of its own, and the box with the lowest bound is divided next. The work may stop at any time:
+the lowest bound of the boxes that are left is valid.
+"""
+
+import heapq
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numba
+import numpy as np
+
+from push_model import se2
+from push_model.arrays import Array
+from push_model.distance_field import DistanceField, lookup
+from push_model.flood import Flood
+from push_planner.dubins_bound import least_length
+from push_planner.guide_path import origin_floor
+from push_planner.scene import PushScene
+
+_STRIDE = 2  # [lattice spacings] between places of the flood
+_OCTAGON = math.cos(math.pi / 8.0)  # of a path of straight and diagonal steps: the shortest one
+_ENDS = 4.0  # [strides] that such a path may be longer than that
+_BATCH = 64  # boxes that are divided at a time
+_WORTH = 0.003  # of the cost: boxes that may save less are not divided
+
+
+@numba.njit(cache=True)  # infinities: no fast mathematics
+def _way(ways: Any, x: float, y: float, ox: float, oy: float, scale: float) -> float:
+    """Least value [m] at the four places about a point; infinite outside the grid."""
+    u, v = (x - ox) * scale, (y - oy) * scale
+    i, j = int(math.floor(v)), int(math.floor(u))
+    if i < 0 or j < 0 or i + 1 >= ways.shape[0] or j + 1 >= ways.shape[1]:
+        return math.inf
+    first, second = min(ways[i, j], ways[i, j + 1]), min(ways[i + 1, j], ways[i + 1, j + 1])
+    return float(min(first, second))
+
+
+@numba.njit(cache=True)
+def _run(
+    x: float, y: float, theta: float, bx: float, by: float, angle: float, radii: Any,
+    off: float, slack: float,
+) -> float:  # fmt: skip
+    """``least_length`` from the pose (x, y, theta) to about the pose (bx, by, angle)."""
+    c, s = math.cos(theta), math.sin(theta)
+    dx, dy = bx - x, by - y
+    return float(
+        least_length(
+            c * dx + s * dy, c * dy - s * dx, angle - theta, radii[0], radii[1], off, slack
+        )
+    )
+
+
+@numba.njit(cache=True)
+def _of_boxes(
+    boxes: Any,
+    starts: Any,
+    goals: Any,
+    contacts: Any,
+    radii: Any,
+    changes: Any,
+    fastest: Any,
+    push_cost: float,
+    ways: Any,
+    place_scale: float,
+    least: float,
+    field: Any,
+    ox: float,
+    oy: float,
+    scale: float,
+) -> Any:
+    """Lower bounds [m] of the cost of plans of two runs that change the side within a box.
+
+    Parameters
+    ----------
+    boxes: ``(n, 5)`` x, y [m], theta [rad] of the centre, half the width in x and y [m], in theta
+        [rad].
+    starts, goals: ``(sides, 3)`` poses of the robot in contact at the start and at the goal.
+    contacts: ``(sides, 3)`` the same in the frame of the object.
+    radii: ``(sides, 2)`` [m] smallest turning radii to the left and to the right.
+    changes: ``(sides, sides)`` [m] costs of a change of the side; infinite on the diagonal.
+    fastest: ``(sides,)`` how far the centre moves at most while the robot drives 1 m.
+    ways: ``(2, rows, columns)`` [m] least way of the centre from the start and to the goal.
+    place_scale: [1/m] places of ``ways`` per metre.
+    least: [m] distance of the centre to obstacles.
+    """
+    n, sides = boxes.shape[0], contacts.shape[0]
+    result = np.full(n, math.inf)
+    first, second = np.empty(sides), np.empty(sides)
+    for k in range(n):
+        x, y, theta, half, slack = boxes[k]
+        off = half * math.sqrt(2.0)
+        if lookup(field, x, y, ox, oy, scale) + off < least:
+            continue
+        gone = max(0.0, _way(ways[0], x, y, ox, oy, place_scale) - off)
+        left = max(0.0, _way(ways[1], x, y, ox, oy, place_scale) - off)
+        c, s = math.cos(theta), math.sin(theta)
+        for side in range(sides):
+            gx, gy, turned = contacts[side]
+            rx, ry, angle = x + c * gx - s * gy, y + s * gx + c * gy, theta + turned
+            around = off + 2.0 * math.hypot(gx, gy) * math.sin(0.5 * slack)
+            there, here = radii[side], radii[side, ::-1]
+            ax, ay, before = starts[side]
+            bx, by, after = goals[side]
+            length = _run(ax, ay, before, rx, ry, angle, there, around, slack)
+            first[side] = max(length, gone / fastest[side])
+            # The way into the goal, driven backward: left turns become right ones.
+            length = _run(bx, by, after + math.pi, rx, ry, angle + math.pi, here, around, slack)
+            second[side] = max(length, left / fastest[side])
+        for a in range(sides):
+            for b in range(sides):
+                result[k] = min(result[k], first[a] + second[b] + changes[a, b])
+        result[k] += 2.0 * push_cost
+    return result
+
+
+def _ways(field: DistanceField, pose: Array, least: float) -> Array:
+    """Lower bounds [m] of the way of the centre between a pose and the places of a flood.
+
+    Every point with the clearance ``least`` has a place about it with less than half a diagonal
+    less.
+    """
+    ox, oy, scale = field.args
+    need = max(0.0, least * scale - _STRIDE / math.sqrt(2.0))
+    flood = Flood(field.values, np.zeros((0, 5)), need, _STRIDE)
+    rows, columns = flood.state.shape
+    u, v = (pose[0] - ox) * scale / _STRIDE, (pose[1] - oy) * scale / _STRIDE
+    about = [(i, j) for i in (int(v), int(v) + 1) for j in (int(u), int(u) + 1)]
+    flood.begin(np.array([(i, j, 0) for i, j in about if i < rows and j < columns]))
+    flood.step(rows * columns)
+    found: Array = np.maximum(_OCTAGON * flood.lengths - _ENDS * _STRIDE, 0.0) / scale
+    return found
+
+
+def least_way(field: DistanceField, start: Array, goal: Array, least: float) -> float:
+    """Lower bound [m] of the way of a point from one position ``(2,)`` to another one.
+
+    least: [m] distance that the point keeps from obstacles.
+    """
+    ways = _ways(field, start, least)
+    return float(_way(ways, goal[0], goal[1], *field.args[:2], field.args[2] / _STRIDE))
+
+
+class CostBound:
+    """The bound for one start and one goal in a scene.
+
+    value: [m] the cost of no plan is less. others: [m] the same of plans of one run, of three or
+    more, and the known cost: ``value`` is not higher.
+    """
+
+    def __init__(self, scene: PushScene, start: Array, goal: Array, most: float) -> None:
+        """Bound by the costs of one run and of three runs.
+
+        Parameters
+        ----------
+        scene: with at least one side to push on.
+        start, goal: ``(3,)`` [m, m, rad] poses of the object's centre of mass, world frame.
+        most: [m] cost of a known plan; the bound is not higher.
+        """
+        settings, sides, field = scene.settings, scene.sides, scene.field
+        contacts = np.array([se2.inverse(s.grasp) for s in sides])
+        starts, goals = (np.array([s.robot_pose(pose) for s in sides]) for pose in (start, goal))
+        limits = np.array([[s.trusted.maximum, s.trusted.minimum] for s in sides])
+        radii = 1.0 / np.abs(limits)
+        x, y = np.array([s.grasp[:2] for s in sides]).T[:, :, None]
+        fastest = np.maximum(np.hypot(1.0 - limits * y, limits * x).max(axis=1), 1.0)
+        apart = contacts[:, None, :2] - contacts[None, :, :2]
+        changes = np.hypot(apart[..., 0], apart[..., 1]) + settings.side_change_cost
+        np.fill_diagonal(changes, math.inf)
+        floor = origin_floor(scene.shape)
+        least = floor + min(scene.leaving(start), settings.safety_distance) if floor > 0.0 else 0.0
+        ways = np.array([_ways(field, pose, least) for pose in (start, goal)])
+        places = field.args[2] / _STRIDE
+        self._known = (
+            *(starts, goals, contacts, radii, changes, fastest, settings.push_cost),
+            *(ways, places, least, field.values, *field.args),
+        )
+        speed, change = float(fastest.max()), float(changes.min())
+        straight = math.hypot(*(goal - start)[:2])
+        way = float(_way(ways[0], goal[0], goal[1], *field.args[:2], places))
+        turn = abs(float(se2.wrap(goal[2] - start[2])))
+        length = max(max(way, straight) / speed, turn * float(radii.min()))
+        runs = [_run(*a, *b, r, 0.0, 0.0) for a, b, r in zip(starts, goals, radii, strict=True)]
+        one = settings.push_cost + max(length, min(runs))
+        several = 3.0 * settings.push_cost + 2.0 * change + length
+        self.others = min(one, several, most)
+        fixed = 2.0 * settings.push_cost + change
+        self.value = min(self.others, fixed + length)
+        self._centre = 0.5 * (start + goal)[:2]
+        self._reach = 0.5 * speed * max(0.0, self.others - fixed)  # of the ellipse of the centre
+        self._turning = float(radii.mean())
+
+    def run(self, boxes: int) -> Iterator[None]:
+        """Raise the bound by dividing up to so many boxes. Yields after each slice."""
+        if self.value >= self.others:
+            return
+        # As much of the bound is lost by the width of a box as by its headings.
+        count = max(1, math.ceil(math.pi * 2.0 * self._turning / (self._reach * math.sqrt(2.0))))
+        slack = math.pi / count
+        roots = np.array(
+            [(*self._centre, (2 * k + 1) * slack, self._reach, slack) for k in range(count)]
+        )
+        queue: list[tuple[float, int, tuple[float, ...]]] = []
+        made = self._add(queue, roots, 0)
+        while queue and queue[0][0] < (1.0 - _WORTH) * self.others and boxes > 0:
+            self.value = max(self.value, queue[0][0])
+            taken = [heapq.heappop(queue)[2] for _ in range(min(_BATCH, len(queue)))]
+            boxes -= len(taken)
+            made = self._add(queue, _divided(np.array(taken)), made)
+            yield
+        lowest = queue[0][0] if queue else math.inf
+        self.value = max(self.value, min(lowest, self.others))
+
+    def _add(
+        self, queue: list[tuple[float, int, tuple[float, ...]]], boxes: Array, made: int
+    ) -> int:
+        """Put boxes into the queue that may hold a cheaper plan; counts those that were made."""
+        bounds = _of_boxes(boxes, *self._known)
+        for bound, box in zip(bounds.tolist(), boxes.tolist(), strict=True):
+            if bound < self.others:
+                made += 1
+                heapq.heappush(queue, (max(bound, self.value), made, tuple(box)))
+        return made
+
+
+def _divided(boxes: Array) -> Array:
+    """The eight parts of each box, in the middle of x, y and theta."""
+    signs = np.array([(i, j, k) for i in (-0.5, 0.5) for j in (-0.5, 0.5) for k in (-0.5, 0.5)])
+    widths = boxes[:, [3, 3, 4]]
+    centres = boxes[:, None, :3] + signs[None] * widths[:, None]
+    halves = np.repeat(0.5 * boxes[:, None, 3:], 8, axis=1)
+    return np.concatenate([centres, halves], axis=2).reshape(-1, 5)
