@@ -33,8 +33,8 @@ function numbers(model, team) {
   if (model.lost.size) rows.push(["not seen", `${model.lost.size}`]);
   rows.push(["to the goal", gap]);
   if (state?.step[1]) rows.push(["step", `${state.step[0]} of ${state.step[1]}`]);
-  const {cost, gap} = team?.plan ?? {};
-  if (cost !== undefined) rows.push(["cost of the plan", `${cost.toFixed(2)} m, at most ${Math.ceil(100 * gap)} % above the best`]);
+  const {cost, gap: above} = team?.plan ?? {};
+  if (cost !== undefined) rows.push(["cost of the plan", `${cost.toFixed(2)} m, at most ${Math.ceil(100 * above)} % above the best`]);
   if (state?.replans) rows.push(["new plans", `${state.replans}`]);
   const told = (team?.rows ?? []).map(r => [r.name, r.text, outside(r) ? "bad" : ""]);
   if (told.length && !busy(team)) rows.push([state?.plan_ready ? "before this plan:" : "of the job that has ended:", "", "former"]);
