@@ -114,6 +114,14 @@ def test_a_goal_is_a_drag_and_nothing_else_is(shown):
     assert angle == pytest.approx(2.0, abs=0.02)
 
 
+def test_nothing_lies_over_the_map(shown):
+    """A goal can be set at the edge, too."""
+    box = "document.getElementById('scene').getBoundingClientRect()"
+    for u in (f"{box}.left + 20", f"{box}.right - 20"):
+        for v in (f"{box}.top + 20", f"{box}.bottom - 20"):
+            assert shown.value(f"document.elementFromPoint({u}, {v}).id") == "scene", (u, v)
+
+
 def test_the_page_tells_what_became_of_its_own_goal(shown):
     """A stranger's refusal is not its own."""
     shown.mouse("mouseReleased", shown.drag(shown.pixel(0.9, -0.4), 60.0, 0.0))

@@ -137,6 +137,10 @@ def test_reports_open_in_a_browser_without_an_error(scenario, tmp_path):
         wait(browser, f"{now} === 4")  # the collision
         browser.value("document.getElementById('go').click()")
         wait(browser, f"{now} > 4.2")
+        size = {"width": 390, "height": 800, "deviceScaleFactor": 1, "mobile": False}
+        browser.call("Emulation.setDeviceMetricsOverride", **size)
+        sideways = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
+        wait(browser, f"{sideways} <= 0 && innerWidth === 390")
         browser.open(f"file://{folder}/report.html")
         head = "[...document.querySelectorAll('th')].filter((h) => h.textContent === 'duration_s')"
         browser.value(f"{head}.pop().click()")
