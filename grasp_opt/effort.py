@@ -35,7 +35,8 @@ class Effort:
 def least_effort(
     contacts: Contacts, friction: float, twists: Array, surface: EllipsoidLimitSurface
 ) -> Effort:
-    """Of a grasp for twists ``(m, 3)`` at even times, in the object's frame."""
+    """Least effort of a grasp that moves the object with twists ``(m, 3)``, given at even times in
+    the frame of the object."""
     n = len(contacts.points)
     edges = np.array([cone_edges(normal, friction) for normal in contacts.normals])
     scale = np.array([1.0, 1.0, surface.radius])

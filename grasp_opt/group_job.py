@@ -281,7 +281,7 @@ class GroupJob:
         return twists
 
     def _look(self, pose: Array, robots: Array) -> None:
-        """At the goal, or what next."""
+        """End the job if the object is at the goal, and otherwise decide what to do next."""
         task, tally, s = self._task, self._tally, self.settings
         assert task.goal is not None
         off = se2.between(task.goal, pose)

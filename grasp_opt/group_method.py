@@ -132,7 +132,7 @@ class GroupMethod:
         return Told({n: (float(v), float(w)) for n, (v, w) in commands}, planning)
 
     def _see_to_plans(self, seen: Seen, belief: Belief) -> float:
-        """Ask for the step that the job needs, and hand it the answer; [s] that planning took."""
+        """Request the step that the job needs and pass it the answer; the planning time [s]."""
         request = self.job.request
         if request is None:
             if self._asked is not None:
@@ -248,7 +248,7 @@ class GroupMethod:
 
 
 def _trajectory(task: Task, item: ObjectSpec) -> ObjectTrajectory:
-    """Of the centre of mass; raises ValueError."""
+    """The trajectory of the centre of mass. Raises ValueError."""
     pose = np.array(task.targets)
     centres = np.array([item.mass_pose(p)[:2] for p in pose])
     return sampled(np.array(task.times), np.column_stack([centres, pose[:, 2]]))

@@ -114,7 +114,7 @@ class GroupPushSettings:
 
 
 class Phase(Enum):
-    """Of a push."""
+    """The phases of a push."""
 
     SEARCH = "search"
     PUSH = "push"
@@ -136,7 +136,7 @@ class GroupStep:
 
 
 class GroupPush:
-    """Robots of one type that stand at ``ways (n,)`` [m] along an outline, a little off it."""
+    """A push by robots of one type, at the arc lengths ``ways (n,)`` [m] along the outline."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""Robots on their ways between pushes: straight lines, and turns on the spot."""
+"""Motions of robots between pushes: straight lines, and turns in place."""
 
 import math
 from collections.abc import Sequence

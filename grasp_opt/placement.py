@@ -173,7 +173,7 @@ class Placer:
         return bool((towards > 0.0).all())
 
     def margin(self, contacts: Contacts) -> float:
-        """Of the grasp-task compatibility test."""
+        """The margin of the grasp-task compatibility test."""
         mu, c = self.item.contact_friction, self._surface.radius
         return margin(wrench_rays(contacts.points, contacts.normals, mu, c), self._wrenches)
 
@@ -317,7 +317,7 @@ class Placer:
         return cost, np.mod(way, self.outline.length)
 
     def placement(self, way: Array) -> Placement:
-        """All about a placement ``(n,)`` [m]."""
+        """A placement, from the arc lengths ``(n,)`` [m] of its robots along the outline."""
         way = np.sort(np.mod(np.asarray(way, dtype=np.float64), self.outline.length))
         cost = self.cost(way)
         u = self._room[0].copy()

@@ -71,7 +71,7 @@ class LocalPlacer:
         self._length = outline.length
 
     def solve(self, way: Array) -> LocalPlacement:
-        """From places ``(n,)`` [m] along the outline, forces of equal size."""
+        """Solve, starting at the arc lengths ``(n,)`` [m] with forces of equal size."""
         count, steps, apart = self._shape
         start = np.concatenate(
             [way, np.full(2 * count * steps, self.placer.size), np.zeros(3 * steps)]

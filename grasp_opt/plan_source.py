@@ -30,7 +30,7 @@ class PlanSource(Protocol):
     """[s] CPU time of the last answer, where it was planned in this process; else 0."""
 
     def ask(self, request: Request, seen: Seen, belief: Belief) -> None:
-        """Ask for a step; an earlier request is forgotten."""
+        """Request a step. It replaces an earlier request."""
         ...
 
     def answer(self, seen: Seen) -> GroupPlan | None:

@@ -126,7 +126,7 @@ class GraspSelector:
         self._first = self._twists[int(np.argmax(moving)), :2]
 
     def margin(self, contacts: Contacts) -> float:
-        """Of the compatibility test."""
+        """The margin of the compatibility test."""
         mu, c = self.item.contact_friction, self._surface.radius
         return margin(wrench_rays(contacts.points, contacts.normals, mu, c), self._wrenches)
 

@@ -1,4 +1,4 @@
-"""Robots to their places round an object: who goes where, in which order and how.
+"""Which robot goes to which place around an object, in which order, and along which path.
 
 The least sum of ways says who takes which place. One after the other they go round everything and
 each other; those whose ways keep apart go at the same time.

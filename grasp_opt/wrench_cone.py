@@ -142,7 +142,7 @@ def _margins(rays: Any, wrenches: Any, result: Any) -> None:
 
 
 def margin(rays: Array, wrenches: Array) -> float:
-    """By how much the cone of rays ``(m, 3)`` holds wrenches ``(q, 3)``, all of unit size.
+    """Margin by which the cone of rays ``(m, 3)`` contains wrenches ``(q, 3)``, all of unit size.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Who may touch whom. PyBullet lets two touch when either's group is in the other's mask.
+"""Which bodies collide. In PyBullet two do if the group of either is in the mask of the other.
 
 Feet, wheels and casters touch the floor alone; discs touch everything but the floor. A wall is one
 body for everybody, or one for robots and another one for objects, where their frictions differ.

@@ -1,4 +1,4 @@
-"""Contacts of many physics steps as one entry a pair of bodies."""
+"""The contacts of many physics steps, as one entry for each pair of bodies."""
 
 from collections.abc import Container, Mapping
 from typing import Any
@@ -13,7 +13,7 @@ _A, _B, _ON_A, _ON_B, _NORMAL, _LOAD = 1, 2, 5, 6, 7, 9
 
 
 class ContactSums:
-    """Adds up the contacts of PyBullet's steps, all of them by one call a step."""
+    """Adds up the contacts of physics steps. One call of PyBullet reads all contacts of a step."""
 
     def __init__(self, client: int, floor: int, movable: Container[int]) -> None:
         """movable: PyBullet ids of robots and objects; the others are walls."""
@@ -53,7 +53,7 @@ class ContactSums:
             sums[11] += 1.0
 
     def read(self, names: Mapping[int, str]) -> list[Contact]:
-        """The means since the last reading."""
+        """The mean of each contact since the previous call."""
         result = []
         for (a, b), sums in self._pairs.items():
             values = np.array(sums)

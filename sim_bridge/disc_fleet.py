@@ -71,7 +71,7 @@ class DiscFleet:
             self.place(i, start)
 
     def _make(self, shape: int, mass: float, inertia: float, start: list[float]) -> int:
-        """Made where it starts: a thousand in one place would all be neighbours."""
+        """Create a disc at its start: discs in one place would all be compared with each other."""
         client = self._client
         body: int = pb.createMultiBody(mass, shape, basePosition=start, physicsClientId=client)
         pb.changeDynamics(body, -1, lateralFriction=self._surface, physicsClientId=client)

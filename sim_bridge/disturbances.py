@@ -1,4 +1,4 @@
-"""What happens to a scenario's bodies at given times: moved, killed, removed, unseen."""
+"""The events of a scenario: bodies are moved, killed, removed or hidden at given times."""
 
 from collections.abc import Sequence
 
@@ -26,15 +26,15 @@ class Disturbances:
         self.restart()
 
     def restart(self) -> None:
-        """From the beginning of the scenario."""
+        """Start again at the beginning of the scenario."""
         self._pending = list(self._events)
 
     def add(self, event: Event) -> None:
-        """One more, until the restart; at the next tick where its time has passed."""
+        """Add an event. It happens at the first tick after its time; a restart drops it."""
         self._pending = sorted([*self._pending, event], key=lambda e: e.at)
 
     def apply(self, tick: int, world: World, capture: MotionCapture) -> list[str]:
-        """Carry out what is due at a tick; a sentence for each."""
+        """Carry out the events that are due at a tick. Returns a sentence for each."""
         done = []
         while self._pending and self._pending[0].at <= tick / self._rate + _LATE:
             done.append(self._carry_out(self._pending.pop(0), tick, world, capture))

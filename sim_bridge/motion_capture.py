@@ -62,7 +62,7 @@ class MotionCapture:
         return self._mean / self._settings.rate, spread / self._settings.rate
 
     def reset(self, seed: int) -> None:
-        """Forget what is under way and start the noise anew."""
+        """Drop the frames that are delayed, and restart the random numbers."""
         self._noise = _Draws(seed, "noise", 3)
         self._chance = _Draws(seed, "dropout", 1)
         self._late = np.random.default_rng([seed, _number("latency")])
@@ -72,13 +72,13 @@ class MotionCapture:
         self._frames, self._mean, self._squares = 0, 0.0, 0.0
 
     def hide(self, names: Sequence[str], until: int) -> None:
-        """Do not see some bodies from now on and before a tick."""
+        """Hide some bodies until a tick."""
         now = self._past[-1][0] if self._past else 0
         for name in names:
             self._hidden.setdefault(name, []).append((now, until))
 
     def observe(self, tick: int, truth: BodyPoses) -> Frame | None:
-        """Note the truth at a tick; returns the frame that is published at this tick, if any."""
+        """Store the true poses of a tick, and return the frame that it publishes, if any."""
         self._past.append((tick, truth))
         instant = self._instant(tick)
         if instant < self._past[0][0]:
@@ -128,7 +128,7 @@ class MotionCapture:
         self._squares += off * (latency - self._mean)
 
     def _kept(self, instant: float, names: tuple[str, ...]) -> Mask | None:
-        """Who is seen at an instant [ticks]; None for everybody."""
+        """The bodies that are seen at an instant [ticks]; None if all are."""
         keep: Mask | None = None
         if self._settings.dropout > 0.0:
             keep = self._chance.next(names)[:, 0] >= self._settings.dropout

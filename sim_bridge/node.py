@@ -134,19 +134,19 @@ class BridgeNode(Node):
         return self._capture.applied_latency
 
     def commanded(self) -> list[str]:
-        """Robots that somebody publishes commands for."""
+        """The robots for which a node publishes commands."""
         return self._named(np.flatnonzero(self._intake.commanded()))
 
     def _named(self, rows: Rows) -> list[str]:
         return [self._intake.gate.names[row] for row in rows]
 
     def _listed(self, rows: Rows) -> str:
-        """Robots in words, for a message."""
+        """Names of robots as text for a message."""
         more = f" and {len(rows) - _SHOWN} more" if len(rows) > _SHOWN else ""
         return ", ".join(self._named(rows[:_SHOWN])) + more
 
     def heard_by(self, count: int) -> bool:
-        """Whether so many listen to the poses."""
+        """Whether so many nodes subscribe to the poses."""
         return bool(self.count_subscribers(self._names.world("poses")) >= count)
 
     def driving(self, robot: str) -> bool:
@@ -162,7 +162,7 @@ class BridgeNode(Node):
             self._advance()
 
     def disturb(self, event: Event) -> None:
-        """Let something happen besides the scenario's events: now, or when its time comes."""
+        """Add an event to those of the scenario. It happens now or at its time."""
         self._disturbances.add(event)
 
     def _on_timer(self) -> None:
@@ -189,7 +189,7 @@ class BridgeNode(Node):
             )
 
     def _release_abandoned(self) -> None:
-        """Do not wait for robots whose commander has left the graph; they are stopped."""
+        """Stop the robots whose commanding node has left the graph, and do not wait for them."""
         rows = self._intake.abandoned(self._lockstep.waiting)
         if not rows.size:
             return
@@ -202,7 +202,7 @@ class BridgeNode(Node):
         self._lockstep.release(rows)
 
     def _advance(self) -> None:
-        """Lockstep: tick until somebody must answer."""
+        """In lockstep: tick until an answer of a robot is needed."""
         while self.running and not self._paused:
             frame = self._tick()
             if frame is not None:
@@ -211,7 +211,7 @@ class BridgeNode(Node):
                 return
 
     def _on_answered(self, stamp: float, rows: Rows) -> None:
-        """Somebody answered the poses of a stamp [s] for robots."""
+        """Handle an answer to the poses of a stamp [s], for some robots."""
         if not (self.settings.lockstep and self.running):
             return
         if self._intake.changed or not self._commanded[rows].all():
@@ -223,7 +223,7 @@ class BridgeNode(Node):
             self._advance()
 
     def _recount(self) -> None:
-        """Ask anew who is commanded; wait for nobody else."""
+        """Update which robots are commanded. Lockstep waits only for these."""
         self._commanded = self._intake.commanded()
         self._lockstep.release(np.flatnonzero(~self._commanded))
 
@@ -312,7 +312,7 @@ class BridgeNode(Node):
         }
 
     def destroy_node(self) -> None:
-        """Close the world too, and give it free."""
+        """Also close the world and release its claim."""
         if self._claim is not None:
             self._claim.close()
         if self.world is not None:
@@ -322,7 +322,7 @@ class BridgeNode(Node):
 
 
 def _number_of(stamp: float) -> int:
-    """Of the frame of a stamp [s]: its nanoseconds, as messages carry them."""
+    """The number of the frame with a stamp [s]: the stamp in nanoseconds, as in messages."""
     return round(1e9 * stamp)
 
 

@@ -1,4 +1,4 @@
-"""When the world may step: in real time, or in lockstep with those who command it."""
+"""When the world may step: in real time, or in lockstep with the nodes that command robots."""
 
 import math
 
@@ -31,14 +31,14 @@ class Lockstep:
         self.ready = not robots.any()
 
     def answer(self, frame: int, rows: Rows) -> bool:
-        """Robots answered a frame; whether it is the newest one."""
+        """Record that robots answered a frame. Returns whether it is the newest one."""
         if frame != self._frame:
             return False
         self.release(rows)
         return True
 
     def release(self, rows: Rows) -> None:
-        """Wait no longer for robots."""
+        """Stop waiting for some robots."""
         self._waiting[rows] = False
         self.ready = not self._waiting.any()
 

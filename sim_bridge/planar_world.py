@@ -121,7 +121,7 @@ class PlanarWorld:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Bodies that are there: robots, then objects."""
+        """Names of the bodies in the world: robots, then objects."""
         return self._names
 
     def _list_bodies(self) -> None:
@@ -139,10 +139,10 @@ class PlanarWorld:
         self._forget()
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Nothing to do: this world holds no resources."""
 
     def _forget(self) -> None:
-        """No contact has an impulse from before, and nothing has been added up."""
+        """Drop the impulses of the previous step and the sums of contacts."""
         self._contacts.number[0] = 0
         self._contacts.table[:] = -1
         self._clear_sums()
@@ -287,7 +287,7 @@ class PlanarWorld:
         self._bodies.velocity[self._rows[name]] = twist
 
     def kill(self, robot: str) -> None:
-        """From now on the robot obeys no command; it stands where it is."""
+        """Stop a robot. From now on it ignores all commands."""
         self.command(robot, 0.0, 0.0)
         self._dead.add(robot)
 

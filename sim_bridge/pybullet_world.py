@@ -94,7 +94,7 @@ class PyBulletWorld:
         self._list_bodies()
 
     def _list_bodies(self) -> None:
-        """Note who is there: names, PyBullet ids, centres of mass in the frames of poses."""
+        """List the bodies: names, PyBullet ids, centres of mass in the frames of their poses."""
         everybody = (*self._robots, *self._objects)
         self._names = tuple(n for n in everybody if n not in self._removed)
         self._listed = [self._ids[n] for n in self._names]
@@ -116,7 +116,7 @@ class PyBulletWorld:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Bodies that are there: robots, then objects."""
+        """Names of the bodies in the world: robots, then objects."""
         return self._names
 
     def close(self) -> None:
@@ -176,7 +176,7 @@ class PyBulletWorld:
             self._wheeled[robot].command_torques(left, right)
 
     def wheel_state(self, robot: str) -> WheelState | None:
-        """Of a robot's wheels; None when it has none."""
+        """State of a robot's wheels; None if it has none."""
         return self._wheeled[robot].wheel_state() if robot in self._wheeled else None
 
     def step(self, count: int = 1, contacts: bool = True) -> None:
@@ -258,12 +258,12 @@ class PyBulletWorld:
             self._objects[name].place(pose)
 
     def kill(self, robot: str) -> None:
-        """From now on the robot obeys no command; it stands where it is."""
+        """Stop a robot. From now on it ignores all commands."""
         self.command(robot, 0.0, 0.0)
         self._dead.add(robot)
 
     def remove(self, name: str) -> None:
-        """Take a body out of the world: it stands far outside and is told of no more."""
+        """Remove a body: it is put far outside and no longer reported."""
         if name in self._removed:
             return
         self._removed.add(name)

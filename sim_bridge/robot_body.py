@@ -1,4 +1,4 @@
-"""What a robot with two driven wheels is in a PyBullet world, whatever drives the wheels."""
+"""A robot with two driven wheels as a body of PyBullet, for all kinds of drives."""
 
 import tempfile
 from pathlib import Path
@@ -87,7 +87,7 @@ class WheeledBody:
             set_group(client, self.body, link, ROBOT if link == _BASE else SUPPORT)
 
     def set_inertia(self, link: int, diagonal: list[float]) -> None:
-        """Of a link (-1: the body), [kg m^2] about its axes; else PyBullet takes its shape's."""
+        """Set a link's inertia [kg m^2] (-1: the body) in place of that of its shape."""
         pb.changeDynamics(
             self.body, link, localInertiaDiagonal=diagonal, physicsClientId=self._client
         )

@@ -43,8 +43,8 @@ class SpeedBody(WheeledBody):
         self.servo(self.drive.wheel_speeds(v, omega), self.drive.wheel_torque)
 
     def command_torques(self, left: float, right: float) -> None:
-        """Its wheels take speeds, not torques."""
+        """Not supported: the wheels take speeds."""
         raise ValueError("wheels of a differential drive take no torques; command a velocity")
 
     def before_step(self) -> None:
-        """PyBullet's motors do it all."""
+        """Nothing to do: PyBullet's motors hold the speeds."""

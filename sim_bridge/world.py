@@ -30,7 +30,7 @@ class Contact:
 
 @dataclass(frozen=True)
 class WheelState:
-    """Of the left and the right wheel, ``(2,)`` each: angle [rad], speed [rad/s], torque [Nm]."""
+    """Of the left and the right wheel ``(2,)``: angles [rad], speeds [rad/s], torques [Nm]."""
 
     angle: Array
     speed: Array
@@ -63,7 +63,7 @@ class BodyPoses(Mapping[str, Array]):
         return len(self.names)
 
     def only(self, keep: Mask) -> "BodyPoses":
-        """Those of a mask ``(n,)``."""
+        """The contacts that a mask ``(n,)`` selects."""
         if keep.all():
             return self
         chosen = np.flatnonzero(keep)
@@ -128,7 +128,7 @@ class World(Protocol):
         ...
 
     def wheel_state(self, robot: str) -> WheelState | None:
-        """Of a robot's wheels; None when it has none."""
+        """State of a robot's wheels; None if it has none."""
         ...
 
     def read_contacts(self) -> list[Contact]:
@@ -140,7 +140,7 @@ class World(Protocol):
         ...
 
     def kill(self, robot: str) -> None:
-        """From now on the robot obeys no command; it stands where it is."""
+        """Stop a robot. From now on it ignores all commands."""
         ...
 
     def remove(self, name: str) -> None:

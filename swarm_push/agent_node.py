@@ -161,7 +161,7 @@ class SwarmAgentNode(Node):
         self._commands.publish(message)
 
     def _tick(self, stamp: Any) -> tuple[float, float]:
-        """It stands while it does not see itself or the object, or nobody tells it a target."""
+        """Do a step. The robot stands while its pose, that of the object or a target is missing."""
         item, own = self._poses.pose(self.object), self._poses.pose(self.robot)
         agent, now = self.agent, self._poses.stamp
         if agent is None or item is None or own is None:

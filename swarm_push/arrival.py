@@ -70,8 +70,10 @@ def pose_errors(pose: Array, target: Array) -> tuple[float, float]:
 
 
 class Arrival:
-    """Of one object. estimate: its pose ``(3,)`` [m, m, rad], noise filtered; deviation: ``(2,)``
-    [m], [rad], standard deviation of the estimate in one coordinate."""
+    """Decides whether an object has arrived.
+
+    estimate: its pose ``(3,)`` [m, m, rad], with the noise filtered. deviation: ``(2,)`` [m],
+    [rad], standard deviation of the estimate in one coordinate."""
 
     def __init__(self, settings: ArrivalSettings) -> None:
         self.settings = settings

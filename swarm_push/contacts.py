@@ -18,7 +18,7 @@ _GAP = 0.01  # [m] up to which a gap to a robot counts as contact
 
 @dataclass(frozen=True)
 class Contacts:
-    """Of n robots at one instant.
+    """The contacts of n robots at one instant.
 
     points ``(n, 2)`` [m], world frame. touched ``(n,)``: robots in contact with anything. pairs
     ``(p, 2)``: indices of robots in contact with each other. at_object: indices of robots in
@@ -35,12 +35,12 @@ class Contacts:
     fixed: Array
 
     def neighbours(self, index: int) -> set[int]:
-        """Robots in contact with one of them."""
+        """The robots that are in contact with a robot."""
         rows = self.pairs[(self.pairs == index).any(axis=1)]
         return set(rows.ravel().tolist()) - {index}
 
     def jam(self, index: int) -> set[int]:
-        """Robots that press on one of them, directly or through others."""
+        """The robots that press on a robot, directly or through others."""
         found, front = {index}, {index}
         while front:
             front = set().union(*(self.neighbours(k) for k in front)) - found

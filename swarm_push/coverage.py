@@ -121,7 +121,7 @@ def _grid(points: Any) -> Any:
 
 @numba.njit(cache=True, error_model="numpy")
 def _told_apart(points: Any) -> Any:
-    """Robots that stand at one place, moved apart by a micrometre, each in its own direction."""
+    """The points, with equal ones moved apart by a micrometre in different directions."""
     n = points.shape[0]
     found = points.copy()
     x0, y0, side, nx, ny, starts, order = _grid(points)

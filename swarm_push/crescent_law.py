@@ -146,7 +146,7 @@ class CrescentLawSettings:
 
 
 class CrescentLaw:
-    """Robots of a radius [m] and a greatest speed [m/s] about one object."""
+    """The law for robots of a radius [m] and a greatest speed [m/s] about one object."""
 
     def __init__(
         self,
@@ -209,7 +209,7 @@ class CrescentLaw:
         return SwarmStep(moved @ world, density, centroids, phase, inward @ world, most)
 
     def _centroids(self, scene: Scene, density: Density) -> Array:
-        """Robots that do not see the object for walls cover nothing: they make for it."""
+        """Centroids of the cells. Robots that do not see the object have no cell: they go to it."""
         if self._walls is None or self._walls.open:
             return self._coverage.centroids(scene.robots, density)
         item = np.repeat(scene.pose[None, :2], len(scene.robots), axis=0)

@@ -67,7 +67,7 @@ Choice = Generator[None, None, tuple[Array, float] | None]
 
 
 class Escape:
-    """For one object among walls."""
+    """Ways of one object out of places between walls."""
 
     def __init__(
         self,

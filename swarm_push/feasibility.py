@@ -92,7 +92,7 @@ class Strength:
 
 
 class Feasibility:
-    """For one object, robots of one type and one map, or an open room without one."""
+    """Feasibility of tasks with one object and robots of one type, on a map or in an open room."""
 
     def __init__(
         self,
@@ -110,7 +110,7 @@ class Feasibility:
         self._space = None if grid is None else FreeSpace(known or grid, _LATTICE)
 
     def assess(self, target: Array, pose: Array, robots: Mapping[str, Array]) -> Assessment:
-        """Of a target ``(3,)``, its heading nan where any will do, for an object at a pose
+        """Assess a target ``(3,)``, whose heading is nan if any will do. The object is at a pose
         ``(3,)``, both of the centre of mass, and robots at poses ``(3,)`` by name."""
         return at_once(self.slices(target, pose, robots))
 
@@ -142,7 +142,7 @@ class Feasibility:
         return Assessment(code, reason, len(able), needed, force, available, way, seconds)
 
     def strength(self, pose: Array, target: Array, robots: int) -> Strength:
-        """Of so many robots that move an object at a pose ``(3,)`` on straight towards a target
+        """Strength of so many robots that push an object at a pose ``(3,)`` straight to a target
         ``(3,)``."""
         twists = self._twists(pose, target)[:1]
         force = max((self.capacity.needed_force(t) for t in twists), default=0.0)

@@ -84,7 +84,7 @@ class _Motion:
 
 @dataclass
 class _Test:
-    """Of one robot: motions still to try, the one under way, since when [s] and from which pose.
+    """The test of one robot: motions still to try, the one under way, its start time [s] and pose.
     leaving: whether it has passed and is on its way out of the jam."""
 
     motions: list[_Motion]
@@ -115,7 +115,7 @@ class _Test:
 
 
 class LivenessCheck:
-    """Robots by name."""
+    """The liveness check of all robots of a swarm, by name."""
 
     def __init__(self, settings: LivenessSettings, wheels: bool) -> None:
         """wheels: whether the robots have two wheels; else they move in any direction."""
@@ -213,7 +213,7 @@ class LivenessCheck:
         twists: Array,
         contacts: Contacts,
     ) -> Array:
-        """Let tests go on, and judge those that are over."""
+        """Continue the tests, and judge those that have ended."""
         if not self._tests:
             return twists
         twists, over = twists.copy(), []

@@ -27,7 +27,7 @@ class TargetQueue:
 
     @classmethod
     def of(cls, targets: Sequence[Array]) -> "TargetQueue":
-        """Of a job that begins."""
+        """The targets of a job that begins."""
         return cls(tuple(np.array(t, dtype=np.float64) for t in targets))
 
     @property
@@ -54,7 +54,7 @@ class TargetQueue:
 
 @dataclass
 class Progress:
-    """Towards one target.
+    """Progress towards one target.
 
     nearest: [m] of way that was left at least. closer: [s] when the object last came closer; able:
     [s] when there were last enough robots.

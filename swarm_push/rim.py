@@ -44,7 +44,7 @@ class Rim:
         self.normals = normal / np.hypot(*normal.T)[:, None]
 
     def nearest(self, points: Array) -> Nearest:
-        """Of points ``(n, 2)`` [m]."""
+        """The rim's points nearest to ``(n, 2)`` [m], by number, and how far inside these are."""
         k = np.hypot(*(points[:, None] - self.points[None]).transpose(2, 0, 1)).argmin(axis=1)
         depth: Array = ((points - self.points[k]) * self.normals[k]).sum(axis=1)
         return k, depth

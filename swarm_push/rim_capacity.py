@@ -30,7 +30,7 @@ _EXACT = 1e-6  # of a wrench
 
 
 class RimCapacity:
-    """Of round robots of one type at one object.
+    """Forces that round robots of one type can apply to one object.
 
     traction: [N] with which one robot can push at most. That it leans back as it pushes takes some
     of the load off its wheels (``push_model.traction``); as much as that is not certain, it is left

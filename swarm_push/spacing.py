@@ -1,4 +1,4 @@
-"""Robots keep apart: pairwise velocity constraints, and the projection of velocities on them.
+"""Keeps robots apart: pairwise velocity constraints, and the projection of velocities on them.
 
 Two robots i and j with a gap g between them, and n the unit vector from i to j, may close the gap
 at most in proportion to what exceeds the gap g0 that is kept:

@@ -107,7 +107,7 @@ class SwarmJob:
 
     @property
     def dead(self) -> frozenset[str]:
-        """Robots that do not do as they are told."""
+        """Robots that do not carry out their commands."""
         return frozenset(self._liveness.dead)
 
     @property
@@ -118,12 +118,12 @@ class SwarmJob:
 
     @property
     def targets(self) -> tuple[Array, ...]:
-        """Of the job, poses ``(3,)`` of the centre of mass, headings nan where any will do."""
+        """Targets of the job: poses ``(3,)`` of the centre of mass; nan is any heading."""
         return self._queue.poses
 
     @property
     def index(self) -> int:
-        """Of the target that is pursued; the number of targets when all are reached."""
+        """Index of the target that is pursued; the number of targets if all are reached."""
         return self._queue.index
 
     @property
@@ -137,8 +137,8 @@ class SwarmJob:
         return self._queue.current
 
     def assess(self, target: Array, pose: Array, robots: Mapping[str, Array]) -> Assessment:
-        """Of a target before it is begun: whether it can be reached, by how many robots, with which
-        margin. Arguments as of ``step``; a job that is under way is not touched."""
+        """Assess a target before it is begun: whether it can be reached, by how many robots, with
+        which margin. Arguments as of ``step``; a job that is under way is not touched."""
         return self._feasibility.assess(target, pose, robots)
 
     def assess_in_slices(
@@ -177,7 +177,7 @@ class SwarmJob:
             self.state, self.reason = JobPhase.IDLE, message
 
     def revive(self) -> None:
-        """Believe in all robots again: a new job, a reset world, or somebody saw to them."""
+        """Take all robots for alive again, e.g. for a new job or after a reset."""
         self._liveness.revive()
 
     def believe(self, item: ObjectSpec) -> None:
@@ -320,14 +320,14 @@ class SwarmJob:
         return False
 
     def _doubt(self, robots: int, strength: Strength | None) -> str:
-        """What speaks against success with so many robots, if anything does."""
+        """The reason why so many robots may fail; empty if there is none."""
         target = self._queue.current
         if target is not None and robots < (least := least_contacts(target)):
             return f"; {too_few(robots, least)}"
         return f"; it {strength}" if strength is not None and strength.thin else ""
 
     def _strength(self, pose: Array, robots: int) -> Strength:
-        """Of so many robots, looked at once for each number."""
+        """Strength of so many robots; computed once for each number."""
         target = self._queue.current
         assert target is not None
         if robots not in self._strengths:

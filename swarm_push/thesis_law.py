@@ -12,7 +12,7 @@ from swarm_push.potential import PotentialSettings, direction_to, swarm_input
 
 @settings
 class ThesisLawSettings(PotentialSettings):
-    """Of section 4.3. Zero deviations follow from the number of robots, as printed."""
+    """Parameters of section 4.3. A deviation of 0 means: from the number of robots, as printed."""
 
     sigma_x: float = bounded(
         0.0,

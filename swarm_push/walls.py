@@ -25,7 +25,9 @@ _BUDGET = 6_000  # places that a tick adds to the paths, which takes about 1 ms
 
 
 class Walls:
-    """For round robots of one radius [m]. open: whether the only walls are those of the room."""
+    """The walls of a map, for round robots of one radius [m].
+
+    open: whether the only walls are those of the room."""
 
     def __init__(self, grid: OccupancyGrid, radius: float) -> None:
         """grid: the map, with at least one place where a robot has room."""

@@ -20,7 +20,7 @@ _SPARE = 0.02  # [m] beyond its depth at which the straight way into a notch beg
 
 
 class WayRound:
-    """Of round robots about one object."""
+    """Ways of round robots around one object."""
 
     def __init__(
         self,
@@ -124,7 +124,7 @@ def _closest(x: float, y: float, way: Any) -> int:
 
 @numba.njit(cache=True, error_model="numpy")
 def _gate(x: float, y: float, way: Any, core: Any) -> Any:
-    """Of the way's points the closest one that leads straight to a place."""
+    """The way's closest point to a place from which a straight line leads there, by number."""
     best, found = math.inf, _closest(x, y, way)
     if not _enters(way[found, 0], way[found, 1], x, y, core):
         return found
