@@ -33,7 +33,7 @@ from push_planner.dubins_bound import least_length
 from push_planner.guide_path import origin_floor
 from push_planner.scene import PushScene
 
-_STRIDE = 2  # [lattice spacings] between places of the flood
+_STRIDE, _PLACES = 2, 100000  # [lattice spacings] between places of a flood; so many about at most
 _OCTAGON = math.cos(math.pi / 8.0)  # of a path of straight and diagonal steps: the shortest one
 _ENDS = 4.0  # [strides] that such a path may be longer than that
 _BATCH = 64  # boxes that are divided at a time
@@ -129,6 +129,11 @@ def _of_boxes(
     return result
 
 
+def _stride(field: DistanceField) -> int:
+    """[lattice spacings] between places; more than the least one on a large map."""
+    return max(_STRIDE, math.ceil(math.sqrt(field.values.size / _PLACES)))
+
+
 def _ways(field: DistanceField, pose: Array, least: float) -> Array:
     """Lower bounds [m] of the way of the centre between a pose and the places of a flood.
 
@@ -136,14 +141,15 @@ def _ways(field: DistanceField, pose: Array, least: float) -> Array:
     less.
     """
     ox, oy, scale = field.args
-    need = max(0.0, least * scale - _STRIDE / math.sqrt(2.0))
-    flood = Flood(field.values, np.zeros((0, 5)), need, _STRIDE)
+    stride = _stride(field)
+    need = max(0.0, least * scale - stride / math.sqrt(2.0))
+    flood = Flood(field.values, np.zeros((0, 5)), need, stride)
     rows, columns = flood.state.shape
-    u, v = (pose[0] - ox) * scale / _STRIDE, (pose[1] - oy) * scale / _STRIDE
+    u, v = (pose[0] - ox) * scale / stride, (pose[1] - oy) * scale / stride
     about = [(i, j) for i in (int(v), int(v) + 1) for j in (int(u), int(u) + 1)]
     flood.begin(np.array([(i, j, 0) for i, j in about if i < rows and j < columns]))
     flood.step(rows * columns)
-    found: Array = np.maximum(_OCTAGON * flood.lengths - _ENDS * _STRIDE, 0.0) / scale
+    found: Array = np.maximum(_OCTAGON * flood.lengths - _ENDS * stride, 0.0) / scale
     return found
 
 
@@ -153,24 +159,23 @@ def least_way(field: DistanceField, start: Array, goal: Array, least: float) -> 
     least: [m] distance that the point keeps from obstacles.
     """
     ways = _ways(field, start, least)
-    return float(_way(ways, goal[0], goal[1], *field.args[:2], field.args[2] / _STRIDE))
+    return float(_way(ways, goal[0], goal[1], *field.args[:2], field.args[2] / _stride(field)))
 
 
 class CostBound:
     """The bound for one start and one goal in a scene.
 
-    value: [m] the cost of no plan is less. others: [m] the same of plans of one run, of three or
-    more, and the known cost: ``value`` is not higher.
+    value: [m] the cost of no plan is less. others: [m] the same for plans of one run, and of three
+    or more; ``value`` is not higher.
     """
 
-    def __init__(self, scene: PushScene, start: Array, goal: Array, most: float) -> None:
+    def __init__(self, scene: PushScene, start: Array, goal: Array) -> None:
         """Bound by the costs of one run and of three runs.
 
         Parameters
         ----------
         scene: with at least one side to push on.
         start, goal: ``(3,)`` [m, m, rad] poses of the object's centre of mass, world frame.
-        most: [m] cost of a known plan; the bound is not higher.
         """
         settings, sides, field = scene.settings, scene.sides, scene.field
         contacts = np.array([se2.inverse(s.grasp) for s in sides])
@@ -185,7 +190,7 @@ class CostBound:
         floor = origin_floor(scene.shape)
         least = floor + min(scene.leaving(start), settings.safety_distance) if floor > 0.0 else 0.0
         ways = np.array([_ways(field, pose, least) for pose in (start, goal)])
-        places = field.args[2] / _STRIDE
+        places = field.args[2] / _stride(field)
         self._known = (
             *(starts, goals, contacts, radii, changes, fastest, settings.push_cost),
             *(ways, places, least, field.values, *field.args),
@@ -198,41 +203,47 @@ class CostBound:
         runs = [_run(*a, *b, r, 0.0, 0.0) for a, b, r in zip(starts, goals, radii, strict=True)]
         one = settings.push_cost + max(length, min(runs))
         several = 3.0 * settings.push_cost + 2.0 * change + length
-        self.others = min(one, several, most)
-        fixed = 2.0 * settings.push_cost + change
-        self.value = min(self.others, fixed + length)
+        self.others = min(one, several)
+        self._fixed, self._speed = 2.0 * settings.push_cost + change, speed
+        self.value = min(self.others, self._fixed + length)
         self._centre = 0.5 * (start + goal)[:2]
-        self._reach = 0.5 * speed * max(0.0, self.others - fixed)  # of the ellipse of the centre
         self._turning = float(radii.mean())
 
-    def run(self, boxes: int) -> Iterator[None]:
-        """Raise the bound by dividing up to so many boxes. Yields after each slice."""
-        if self.value >= self.others:
+    def run(self, boxes: int, cost: float = math.inf) -> Iterator[None]:
+        """Raise the bound by dividing up to so many boxes. Yields after each slice.
+
+        cost: [m] of a known plan; the bound is not raised above it.
+        """
+        most = min(self.others, cost)
+        reach = 0.5 * self._speed * (most - self._fixed)  # the ellipse of the centre is within it
+        if self.value >= most or reach <= 0.0:
+            self.value = min(self.value, most)
             return
         # As much of the bound is lost by the width of a box as by its headings.
-        count = max(1, math.ceil(math.pi * 2.0 * self._turning / (self._reach * math.sqrt(2.0))))
+        count = max(1, math.ceil(math.pi * 2.0 * self._turning / (reach * math.sqrt(2.0))))
         slack = math.pi / count
-        roots = np.array(
-            [(*self._centre, (2 * k + 1) * slack, self._reach, slack) for k in range(count)]
-        )
+        roots = [(*self._centre, (2 * k + 1) * slack, reach, slack) for k in range(count)]
         queue: list[tuple[float, int, tuple[float, ...]]] = []
-        made = self._add(queue, roots, 0)
-        while queue and queue[0][0] < (1.0 - _WORTH) * self.others and boxes > 0:
+        made = self._add(queue, np.array(roots), 0, most)
+        while queue and queue[0][0] < (1.0 - _WORTH) * most and boxes > 0:
             self.value = max(self.value, queue[0][0])
             taken = [heapq.heappop(queue)[2] for _ in range(min(_BATCH, len(queue)))]
             boxes -= len(taken)
-            made = self._add(queue, _divided(np.array(taken)), made)
+            made = self._add(queue, _divided(np.array(taken)), made, most)
             yield
-        lowest = queue[0][0] if queue else math.inf
-        self.value = max(self.value, min(lowest, self.others))
+        self.value = max(self.value, min(queue[0][0] if queue else math.inf, most))
 
     def _add(
-        self, queue: list[tuple[float, int, tuple[float, ...]]], boxes: Array, made: int
+        self,
+        queue: list[tuple[float, int, tuple[float, ...]]],
+        boxes: Array,
+        made: int,
+        most: float,
     ) -> int:
         """Put boxes into the queue that may hold a cheaper plan; counts those that were made."""
         bounds = _of_boxes(boxes, *self._known)
         for bound, box in zip(bounds.tolist(), boxes.tolist(), strict=True):
-            if bound < self.others:
+            if bound < most:
                 made += 1
                 heapq.heappush(queue, (max(bound, self.value), made, tuple(box)))
         return made

@@ -135,7 +135,7 @@ class PushPlanner:
         if not self.scene.sides:
             return np.inf
         start, goal = (self.scene.item.mass_pose(pose) for pose in (start, goal))
-        return float(CostBound(self.scene, start, goal, np.inf).value)
+        return float(CostBound(self.scene, start, goal).value)
 
     def plan(
         self,
@@ -172,7 +172,8 @@ class PushPlanner:
         guides = _Guides(self._guides(start, goal, work.seed), work, settings.rrt_iterations)
         yield Progress("guide path", None)
         guides.number(0)
-        work.least = self.lower_bound(*ends)
+        bound = CostBound(self.scene, start, goal)
+        work.least = bound.value
         best: PushPlan | None = None
         if settings.planner == "thesis":
             best = yield from self._as_printed(ends, min(guides.all(), key=lambda g: g.cost), work)
@@ -183,8 +184,7 @@ class PushPlanner:
             if best is None:
                 raise self._refusal(ends, guides.all(), work)
             best = yield from self._improved(best, ends, guides, work)
-        bound = CostBound(self.scene, start, goal, best.cost)
-        for _ in bound.run(settings.bound_boxes):
+        for _ in bound.run(settings.bound_boxes, best.cost):
             yield Progress("lower bound of the cost", best)
         statistics = work.counted(best.guide)
         yield Progress("done", replace(best, cost_bound=bound.value, statistics=statistics))
