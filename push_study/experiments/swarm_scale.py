@@ -1,6 +1,5 @@
 """How a swarm fares as it grows: discs that bring the square to a position, eight to a thousand."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,6 +14,7 @@ import numpy as np
 from push_model.settings import SettingsError
 from push_model.specs import EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
+from push_scenario.scenario import Scenario
 from push_study.pool import Row
 from push_study.rooms import around
 from push_study.study import StudyOptions
@@ -30,6 +30,7 @@ ROBOTS = (8, 20, 50, 100, 200, 500, 1000)
 DISTANCE = 1.5  # [m]
 REACHED = 0.1  # [m]
 _LIMIT = 300.0  # [s]
+_LEAST, _SPACE = 2.5, 0.5  # [m] half the width of the room at least; from the discs to its walls
 
 
 @dataclass(frozen=True)
@@ -55,16 +56,21 @@ def tasks(options: StudyOptions) -> list[ScaleTask]:
     ]
 
 
-def trial(task: ScaleTask) -> Row:
-    """To the position, discs starting anywhere about the object."""
+def scenario_of(task: ScaleTask) -> Scenario:
+    """Discs anywhere about the object, in a room with space for all of them."""
     item, disc = load_object(task.scenario), load_robot("disc")
-    half = max(2.5, 0.16 * math.sqrt(task.robots) + 1.5)
     random = np.random.default_rng([task.seed, task.robots])
     begin = around(random, task.robots, item, disc.footprint_radius)
+    half = max(_LEAST, float(np.abs(begin[:, :2]).max()) + _SPACE)
     room = EnvironmentSpec((2.0 * half, 2.0 * half), resolution=0.05)
     swarm = {"position_tolerance": REACHED, "orientation": False, "stalled": _LIMIT}
-    scenario = made_scenario(task.scenario, room, disc, begin, item, np.zeros(3), {"swarm": swarm})
-    doubt = uncertainty(task.uncertainty)
+    return made_scenario(task.scenario, room, disc, begin, item, np.zeros(3), {"swarm": swarm})
+
+
+def trial(task: ScaleTask) -> Row:
+    """To the position."""
+    scenario, doubt = scenario_of(task), uncertainty(task.uncertainty)
+    ((disc, _), *_) = scenario.robots.values()
     goal = positions([(DISTANCE, 0.0)])
     outcome = run_team("swarm", scenario, goal, doubt, task.seed, _LIMIT, world=task.world)
     row: Row = {
