@@ -1,7 +1,7 @@
 """How far the world of a trial is from what planner, controller and supervisor believe."""
 
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +16,7 @@ from push_scenario.scenario import Scenario
 from push_study.pool import Row
 
 Range = tuple[float, float]
+_FEW = 20  # robots of which a row has what was drawn for each; of more, the extremes
 
 
 @dataclass(frozen=True)
@@ -78,8 +79,10 @@ class Uncertainty:
         for name, (item, start) in believed.objects.items():
             objects[name] = (self.draw_item(name, item, random, drawn), start)
         robots = {}
+        grips: Row = {}
         for name, (robot, start) in believed.robots.items():
-            robots[name] = (self.draw_robot(name, robot, random, drawn), start)
+            robots[name] = (self.draw_robot(name, robot, random, grips), start)
+        drawn.update(grips if len(robots) <= _FEW else _extremes(grips, list(robots)))
         robots = self.draw_robot_friction(robots, random, drawn)
         return believed, replace(believed, objects=objects, robots=robots), drawn
 
@@ -188,3 +191,17 @@ def uncertainty(name: str) -> Uncertainty:
         known = ", ".join(UNCERTAINTIES)
         raise SettingsError(f"uncertainty: expected one of {known}, got '{name}'")
     return UNCERTAINTIES[name]
+
+
+def _extremes(drawn: Row, robots: Sequence[str]) -> Row:
+    """Least and greatest value of each quantity that was drawn for robots."""
+    values: dict[str, list[float]] = {}
+    for name in robots:
+        for key, value in drawn.items():
+            if key.startswith(f"{name}_"):
+                values.setdefault(key.removeprefix(f"{name}_"), []).append(value)
+    found: Row = {}
+    for key, drawn_values in values.items():
+        found[f"robots_least_{key}"] = min(drawn_values)
+        found[f"robots_greatest_{key}"] = max(drawn_values)
+    return found

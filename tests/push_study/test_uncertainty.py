@@ -107,3 +107,17 @@ def test_hard_poses_have_jitter_and_mild_ones_have_not():
 def test_an_unknown_name_is_refused():
     with pytest.raises(SettingsError, match="none, mild, hard"):
         uncertainty("much")
+
+
+def test_a_row_of_a_crowd_has_the_extremes_and_not_a_column_for_each_robot():
+    believed = load_scenario("swarm-square")
+    ((robot, _), *_) = believed.robots.values()
+    crowd = {f"e{i}": (robot, np.array([0.3 * i, 9.0, 0.0])) for i in range(50)}
+    _, world, drawn = uncertainty("mild").draw(replace(believed, robots=crowd), 3)
+    grips = [r.drive.wheel_friction for r, _ in world.robots.values()]
+    assert drawn["robots_least_wheel_friction"] == min(grips)
+    assert drawn["robots_greatest_wheel_friction"] == max(grips)
+    assert not any(key.startswith("e1") for key in drawn)
+    few = dict(list(crowd.items())[:20])
+    _, world, drawn = uncertainty("mild").draw(replace(believed, robots=few), 3)
+    assert drawn["e7_wheel_friction"] == world.robots["e7"][0].drive.wheel_friction
