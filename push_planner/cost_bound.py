@@ -35,20 +35,57 @@ from push_planner.scene import PushScene
 
 _STRIDE, _PLACES = 2, 100000  # [lattice spacings] between places of a flood; so many about at most
 _OCTAGON = math.cos(math.pi / 8.0)  # of a path of straight and diagonal steps: the shortest one
-_ENDS = 4.0  # [strides] that such a path may be longer than that
+_ENDS = 1.0  # [strides] that such a path may be longer than that (tested: none was)
 _BATCH = 64  # boxes that are divided at a time
 _WORTH = 0.003  # of the cost: boxes that may save less are not divided
 
 
 @numba.njit(cache=True)  # infinities: no fast mathematics
-def _way(ways: Any, x: float, y: float, ox: float, oy: float, scale: float) -> float:
-    """Least value [m] at the four places about a point; infinite outside the grid."""
-    u, v = (x - ox) * scale, (y - oy) * scale
-    i, j = int(math.floor(v)), int(math.floor(u))
-    if i < 0 or j < 0 or i + 1 >= ways.shape[0] or j + 1 >= ways.shape[1]:
+def _way(ways: Any, x: float, y: float, half: float, ox: float, oy: float, scale: float) -> float:
+    """Least value [m] at the places in and about a square; infinite if it has none.
+
+    The square is ``2 half`` [m] wide. The values at both sides of a wall differ by more than the
+    square is wide, so that the value in the middle says nothing of the others.
+
+    ways: ``(levels, rows, columns)`` [m] from ``_windows``.
+    """
+    levels, rows, columns = ways.shape
+    bottom = max(0, int(math.floor((y - half - oy) * scale)))
+    left = max(0, int(math.floor((x - half - ox) * scale)))
+    top = min(rows - 1, int(math.floor((y + half - oy) * scale)) + 1)
+    right = min(columns - 1, int(math.floor((x + half - ox) * scale)) + 1)
+    if top < bottom or right < left:
         return math.inf
-    first, second = min(ways[i, j], ways[i, j + 1]), min(ways[i + 1, j], ways[i + 1, j + 1])
-    return float(min(first, second))
+    level = min(levels - 1, int(math.log2(min(top - bottom, right - left) + 1)))
+    size = 1 << level
+    least = math.inf
+    i = bottom
+    while True:
+        j = left
+        while True:
+            least = min(least, ways[level, i, j])
+            if j + size > right:
+                break
+            j = min(j + size, right - size + 1)
+        if i + size > top:
+            break
+        i = min(i + size, top - size + 1)
+    return float(least)
+
+
+def _windows(ways: Array) -> Array:
+    """``(levels, rows, columns)`` least values of windows ``(2**level, 2**level)``, each at its
+    first row and column; windows at the end are cut off."""
+    levels = [ways]
+    size = 1
+    while 2 * size <= min(ways.shape):
+        pairs = levels[-1].copy()
+        pairs[:-size] = np.minimum(pairs[:-size], levels[-1][size:])
+        whole = pairs.copy()
+        whole[:, :-size] = np.minimum(whole[:, :-size], pairs[:, size:])
+        levels.append(whole)
+        size *= 2
+    return np.array(levels)
 
 
 @numba.njit(cache=True)
@@ -95,7 +132,8 @@ def _of_boxes(
     radii: ``(sides, 2)`` [m] smallest turning radii to the left and to the right.
     changes: ``(sides, sides)`` [m] costs of a change of the side; infinite on the diagonal.
     fastest: ``(sides,)`` how far the centre moves at most while the robot drives 1 m.
-    ways: ``(2, rows, columns)`` [m] least way of the centre from the start and to the goal.
+    ways: ``(2, levels, rows, columns)`` [m] least way of the centre from the start and to the goal,
+        see ``_windows``.
     place_scale: [1/m] places of ``ways`` per metre.
     least: [m] distance of the centre to obstacles.
     """
@@ -105,10 +143,11 @@ def _of_boxes(
     for k in range(n):
         x, y, theta, half, slack = boxes[k]
         off = half * math.sqrt(2.0)
-        if lookup(field, x, y, ox, oy, scale) + off < least:
+        # What is looked up is a lower bound, by less than a spacing of the lattice.
+        if lookup(field, x, y, ox, oy, scale) + off + 1.0 / scale < least:
             continue
-        gone = max(0.0, _way(ways[0], x, y, ox, oy, place_scale) - off)
-        left = max(0.0, _way(ways[1], x, y, ox, oy, place_scale) - off)
+        gone = _way(ways[0], x, y, half, ox, oy, place_scale)
+        left = _way(ways[1], x, y, half, ox, oy, place_scale)
         c, s = math.cos(theta), math.sin(theta)
         for side in range(sides):
             gx, gy, turned = contacts[side]
@@ -135,7 +174,8 @@ def _stride(field: DistanceField) -> int:
 
 
 def _ways(field: DistanceField, pose: Array, least: float) -> Array:
-    """Lower bounds [m] of the way of the centre between a pose and the places of a flood.
+    """Lower bounds [m] of the way of the centre between a pose and the places of a flood, see
+    ``_windows``.
 
     Every point with the clearance ``least`` has a place about it with less than half a diagonal
     less.
@@ -149,8 +189,7 @@ def _ways(field: DistanceField, pose: Array, least: float) -> Array:
     about = [(i, j) for i in (int(v), int(v) + 1) for j in (int(u), int(u) + 1)]
     flood.begin(np.array([(i, j, 0) for i, j in about if i < rows and j < columns]))
     flood.step(rows * columns)
-    found: Array = np.maximum(_OCTAGON * flood.lengths - _ENDS * stride, 0.0) / scale
-    return found
+    return _windows(np.maximum(_OCTAGON * flood.lengths - _ENDS * stride, 0.0) / scale)
 
 
 def least_way(field: DistanceField, start: Array, goal: Array, least: float) -> float:
@@ -159,14 +198,15 @@ def least_way(field: DistanceField, start: Array, goal: Array, least: float) -> 
     least: [m] distance that the point keeps from obstacles.
     """
     ways = _ways(field, start, least)
-    return float(_way(ways, goal[0], goal[1], *field.args[:2], field.args[2] / _stride(field)))
+    return float(_way(ways, *goal[:2], 0.0, *field.args[:2], field.args[2] / _stride(field)))
 
 
 class CostBound:
     """The bound for one start and one goal in a scene.
 
-    value: [m] the cost of no plan is less. others: [m] the same for plans of one run, and of three
-    or more; ``value`` is not higher.
+    value: [m] the cost of no plan is less. one, several: [m] the same for plans of one run, and of
+    three or more; ``value`` is not higher. fastest: ``(sides,)`` how far the centre of mass moves
+    at most while the robot drives 1 m.
     """
 
     def __init__(self, scene: PushScene, start: Array, goal: Array) -> None:
@@ -191,21 +231,21 @@ class CostBound:
         least = floor + min(scene.leaving(start), settings.safety_distance) if floor > 0.0 else 0.0
         ways = np.array([_ways(field, pose, least) for pose in (start, goal)])
         places = field.args[2] / _stride(field)
+        self.fastest = fastest
         self._known = (
             *(starts, goals, contacts, radii, changes, fastest, settings.push_cost),
             *(ways, places, least, field.values, *field.args),
         )
         speed, change = float(fastest.max()), float(changes.min())
         straight = math.hypot(*(goal - start)[:2])
-        way = float(_way(ways[0], goal[0], goal[1], *field.args[:2], places))
+        way = float(_way(ways[0], *goal[:2], 0.0, *field.args[:2], places))
         turn = abs(float(se2.wrap(goal[2] - start[2])))
         length = max(max(way, straight) / speed, turn * float(radii.min()))
         runs = [_run(*a, *b, r, 0.0, 0.0) for a, b, r in zip(starts, goals, radii, strict=True)]
-        one = settings.push_cost + max(length, min(runs))
-        several = 3.0 * settings.push_cost + 2.0 * change + length
-        self.others = min(one, several)
+        self.one = settings.push_cost + max(length, min(runs))
+        self.several = 3.0 * settings.push_cost + 2.0 * change + length
         self._fixed, self._speed = 2.0 * settings.push_cost + change, speed
-        self.value = min(self.others, self._fixed + length)
+        self.value = min(self.one, self.several, self._fixed + length)
         self._centre = 0.5 * (start + goal)[:2]
         self._turning = float(radii.mean())
 
@@ -214,7 +254,7 @@ class CostBound:
 
         cost: [m] of a known plan; the bound is not raised above it.
         """
-        most = min(self.others, cost)
+        most = min(self.one, self.several, cost)
         reach = 0.5 * self._speed * (most - self._fixed)  # the ellipse of the centre is within it
         if self.value >= most or reach <= 0.0:
             self.value = min(self.value, most)
@@ -233,6 +273,12 @@ class CostBound:
             yield
         self.value = max(self.value, min(queue[0][0] if queue else math.inf, most))
 
+    def of_boxes(self, boxes: Array) -> Array:
+        """Bounds ``(n,)`` [m] of plans of two runs that change the side in a box ``(n, 5)``: x, y
+        [m], theta [rad] of its centre, half its width in x and y [m] and in theta [rad]."""
+        found: Array = _of_boxes(boxes, *self._known)
+        return found
+
     def _add(
         self,
         queue: list[tuple[float, int, tuple[float, ...]]],
@@ -241,7 +287,7 @@ class CostBound:
         most: float,
     ) -> int:
         """Put boxes into the queue that may hold a cheaper plan; counts those that were made."""
-        bounds = _of_boxes(boxes, *self._known)
+        bounds = self.of_boxes(boxes)
         for bound, box in zip(bounds.tolist(), boxes.tolist(), strict=True):
             if bound < most:
                 made += 1

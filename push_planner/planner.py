@@ -147,8 +147,9 @@ class PushPlanner:
     ) -> Iterator[Progress]:
         """Plan in small slices: each ``next`` does a little work and reports.
 
-        thorough: whether a long search follows where the others find no plan. robot: ``(3,)`` pose
-        of the robot, from which it must have a way to the first side; None if unknown.
+        thorough: whether a long search follows where the others find no plan, and whether the lower
+        bound is raised by the work on two runs. robot: ``(3,)`` pose of the robot, from which it
+        must have a way to the first side; None if unknown.
 
         The last report carries the best plan, with the lower bound of all costs. A plan that is
         reported never costs more than one before it. The work is counted, never timed, so that
@@ -184,7 +185,7 @@ class PushPlanner:
             if best is None:
                 raise self._refusal(ends, guides.all(), work)
             best = yield from self._improved(best, ends, guides, work)
-        for _ in bound.run(settings.bound_boxes, best.cost):
+        for _ in bound.run(settings.bound_boxes if thorough else 0, best.cost):
             yield Progress("lower bound of the cost", best)
         statistics = work.counted(best.guide)
         yield Progress("done", replace(best, cost_bound=bound.value, statistics=statistics))

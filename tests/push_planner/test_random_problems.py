@@ -11,6 +11,7 @@ from push_model.occupancy import rasterise
 from push_model.settings import SettingsError
 from push_model.specs import BoxSpec, EnvironmentSpec
 from push_planner import PlanError, PlannerSettings, PlanningFailed, PushPlanner
+from push_planner.cost_bound import CostBound
 
 COUNT = 30
 
@@ -69,6 +70,11 @@ def test_costs_are_those_of_the_pushes_and_no_lower_than_the_bound(outcomes, pla
                     cost += np.hypot(*way) + settings.side_change_cost
             assert plan.cost == pytest.approx(cost, abs=1e-9)
             assert plan.cost >= plan.cost_bound >= planner.lower_bound(start, goal)
+        ends = (planner.scene.item.mass_pose(pose) for pose in (start, goal))
+        bound = CostBound(planner.scene, *ends)  # not told what the plans cost
+        for _ in bound.run(settings.bound_boxes):
+            pass
+        assert all(plan.cost >= bound.value - 1e-9 for plan in plans)
 
 
 def test_plans_join_start_and_goal_by_stable_pushes_that_touch_no_occupied_cell(

@@ -17,6 +17,7 @@ from push_record.bag import BagWriter, bag_file, older_types, read_bag, read_met
 from push_record.contents import load
 from push_record.faults import faults_of
 from push_record.interfaces import interface_folder, typestore
+from push_record.older_messages import OlderMessages
 from push_ros.conversions import poses_to_ros
 from push_scenario.scenario import load_scenario
 
@@ -91,12 +92,14 @@ def test_full_disk_ends_the_recording_and_nothing_else(tmp_path, monkeypatch):
 
 
 def older_store():
-    """The interfaces before plans told the bound of their cost, with a field that is gone."""
+    """The interfaces before plans told the bound of their cost, with a field that is gone and one
+    that was a text."""
     store = typestore()
     folder = interface_folder("push_msgs") / "msg"
     text = (folder / "PushPlan.msg").read_text()
     assert "float64 cost_bound" in text
     lines = [line for line in text.splitlines() if not line.startswith("float64 cost_bound")]
+    lines = [line.replace("float64 clearance", "string clearance") for line in lines]
     types = get_types_from_msg("\n".join(["uint8 mood", *lines]), "push_msgs/msg/PushPlan")
     older = get_typestore(Stores.ROS2_JAZZY)
     own = {
@@ -115,6 +118,7 @@ def test_a_bag_of_another_version_is_read_by_the_definitions_that_it_carries(tmp
     plan.segments = [PushSegment(side=2, length=1.25, trajectory=driven)]
     new = present.deserialize_cdr(serialize_message(plan), name)
     kept = {field: getattr(new, field) for field, _ in older.fielddefs[name][1] if field != "mood"}
+    kept["clearance"] = "wide"
     data = older.serialize_cdr(older.types[name](mood=3, **kept), name)
     monkeypatch.setattr("push_record.bag.typestore", lambda: older)
     about = {**META, "scenario": load_scenario("short").text}
@@ -134,9 +138,19 @@ def test_a_bag_of_another_version_is_read_by_the_definitions_that_it_carries(tmp
         assert len(plans) == 3
         for found in plans:
             assert (found.object, found.robot, found.cost, found.length) == ("box", "e1", 1.5, 1.25)
-            assert found.cost_bound == 0.0 and found.segments[0].side == 2
+            assert found.cost_bound == 0.0 and found.clearance == 0.0
+            assert found.segments[0].side == 2
             assert found.segments[0].trajectory.x.tolist() == [0.5, 1.0]
         poses = [r.message.x[0] for r in read_bag(bag, {"/poses"})]
         assert poses == [0.0, 0.5, 1.0]
     told = faults_of(tmp_path / "bag", load(tmp_path / "bag"))
     assert [(f.kind, f.where) for f in told] == [("another version", name)]
+
+
+@pytest.mark.parametrize("text", ["", "no definition", "float64 x\nmore", "Unknown what"])
+def test_a_definition_that_cannot_be_read_counts_as_the_present_one(text):
+    name, data = "push_msgs/msg/PushPlan", serialize_message(PushPlan(object="box", cost=1.5))
+    older = OlderMessages()
+    older.define(name, text)
+    found = typestore().deserialize_cdr(older.present(name, data), name)
+    assert (found.object, found.cost) == ("box", 1.5)
