@@ -3,6 +3,7 @@
 from push_bringup.one_robot_plans import wider
 from push_job.method import Seen
 from push_model.belief import POSES, Belief
+from push_model.stick_certificate import ContactBelief
 from push_mpc import Push, Task, Tick, TrajectoryTracker, line_contact
 from push_mpc.believed_push import Unstable, believed_push
 from push_mpc.other_bodies import kept_off
@@ -53,7 +54,7 @@ class Drive:
         if self.tracker.active and self._push is not None:
             try:
                 robot, item = belief.robot(self._robot), belief.object(self._item)
-                push = believed_push(self._push, robot, item)
+                push = believed_push(self._push, robot, item, ContactBelief.of(belief, self._item))
             except Unstable as error:
                 self.tracker.stop()
                 failure = events.MotionFailed(str(error))

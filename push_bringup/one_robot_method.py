@@ -23,6 +23,7 @@ from push_model.distance_field import DistanceField
 from push_model.jobs import GoalRefused, JobError, JobPhase
 from push_model.settings import SettingsError
 from push_model.specs import ObjectSpec, RobotSpec
+from push_model.stick_certificate import ContactBelief
 from push_mpc import LtvMpc, MpcSettings, TrackerSettings, TrajectoryTracker
 from push_mpc.tick_report import tick_report
 from push_planner import PlannerSettings, PlanningFailed
@@ -106,7 +107,8 @@ class OneRobotMethod:
         try:
             self._surroundings(*specs).check_goal(goal)
             if seen is None or not self._there(goal, seen):
-                check_room(self._plans.planner(*specs).scene, goal, "pushed into the goal")
+                planner = self._plans.planner(*specs, ContactBelief.of(belief, self._item))
+                check_room(planner.scene, goal, "pushed into the goal")
         except GoalRefused as refusal:
             return Refusal(refusal.code, str(refusal))
         except PlanningFailed as failure:
@@ -144,10 +146,8 @@ class OneRobotMethod:
             return
         self._belief = belief
         specs = belief.robot(self._name), belief.object(self._item)
-        near = self._surroundings(*specs)
-        if near is not self._near:
-            self._near = near
-            self._plans.believe(*specs)
+        self._near = self._surroundings(*specs)
+        self._plans.believe(*specs, ContactBelief.of(belief, self._item))
         self._tell(self._drive.believe(belief))
 
     def _tell(self, event: events.Event | None) -> None:

@@ -9,6 +9,7 @@ from push_model.arrays import Array
 from push_model.distance_field import DistanceField
 from push_model.jobs import JobError
 from push_model.specs import ObjectSpec, RobotSpec
+from push_model.stick_certificate import ContactBelief
 from push_planner import (
     NoRobotPath,
     PlanError,
@@ -38,24 +39,31 @@ class Plans:
         self._draws = 0  # pre-emptive pushes asked for: each draws others
         self._planner: PushPlanner | None = None
         self._work: Iterator[Progress] | None = None
-        self.believe(robot, item)
+        self._specs: tuple[RobotSpec, ObjectSpec, ContactBelief | None] = robot, item, None
         try:
             warm_up(settings, robot, item)
         except PlanningFailed:
             pass  # an object that cannot be pushed is refused with its goal
 
-    def planner(self, robot: RobotSpec, item: ObjectSpec) -> PushPlanner:
+    def planner(
+        self, robot: RobotSpec, item: ObjectSpec, believed: ContactBelief | None
+    ) -> PushPlanner:
         """For a robot and an object; that at work where they are as is believed."""
-        if (robot, item) != (self._robot, self._item):
-            return PushPlanner(self._settings, self._field, robot, item)
+        specs = robot, item, believed
+        if specs != self._specs:
+            return PushPlanner(self._settings, self._field, *specs)
         if self._planner is None:
-            self._planner = PushPlanner(self._settings, self._field, robot, item)
+            self._planner = PushPlanner(self._settings, self._field, *specs)
         return self._planner
 
-    def believe(self, robot: RobotSpec, item: ObjectSpec) -> None:
-        """Go on with another belief: a plan that is being made is begun anew."""
-        self._robot, self._item = robot, item
-        self._planner = self._work = None
+    def believe(self, robot: RobotSpec, item: ObjectSpec, believed: ContactBelief | None) -> None:
+        """Go on with what is believed; if it has changed, a plan under way is begun anew.
+
+        believed: intervals of friction and centre of mass, where somebody has given some.
+        """
+        if (robot, item, believed) != self._specs:
+            self._specs = robot, item, believed
+            self._planner = self._work = None
 
     def drop(self) -> None:
         """No plan is wanted any more."""
@@ -72,7 +80,7 @@ class Plans:
             return None
         except StopIteration:
             assert self._best is not None
-            pushes = joined(self._best.segments, self._robot.differential, self._settings)
+            pushes = joined(self._best.segments, self._specs[0].differential, self._settings)
             answer: events.Event = events.PlanFound(pushes)
         except TooHeavy as error:
             answer = events.PlanFailed(JobError.TOO_HEAVY, str(error))
@@ -84,7 +92,7 @@ class Plans:
         return answer
 
     def _begin(self, goal: Array, seen: Seen, robot: Array, preemptive: int) -> Iterator[Progress]:
-        planner = self.planner(self._robot, self._item)
+        planner = self.planner(*self._specs)
         yield from plan_among_bodies(planner, seen.object, goal, seen.obstacles, preemptive, robot)
 
     def way(
@@ -92,10 +100,10 @@ class Plans:
     ) -> events.Event:
         """The robot's way to where its next push begins."""
         to = motions.standoff(command.segment, seen.object)
-        others = wider(seen.obstacles, self._robot.footprint_radius)
+        others = wider(seen.obstacles, self._specs[0].footprint_radius)
         circles = np.vstack([near.on_the_way(seen.object, {}), others])
         try:
-            way = plan_robot_path(self._field, self._robot, self._settings, robot, to, circles)
+            way = plan_robot_path(self._field, self._specs[0], self._settings, robot, to, circles)
         except NoRobotPath as error:
             return events.PathFailed(str(error), crowded=len(others) > 0)
         return events.PathFound(way)

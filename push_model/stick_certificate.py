@@ -13,8 +13,9 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from push_model.belief import Interval
+from push_model.belief import Belief, Interval
 from push_model.pushable_sides import pushable_sides
+from push_model.settings import SettingsError
 from push_model.specs import ObjectSpec, RobotSpec
 from push_model.stable_push import (
     CurvatureLimits,
@@ -27,6 +28,10 @@ BEND = 0.99
 """Part of the least stable curvature at the corners that is stable in between, too."""
 
 
+CONTACT_QUANTITIES = ("contact_friction", "com_x", "com_y")
+"""Of the object, on which the stable curvatures depend."""
+
+
 @dataclass(frozen=True)
 class ContactBelief:
     """Intervals of the friction at the bumper and of the centre of mass [m], object frame."""
@@ -34,6 +39,17 @@ class ContactBelief:
     friction: Interval
     com_x: Interval
     com_y: Interval
+
+    @classmethod
+    def of(cls, belief: Belief, item: str) -> "ContactBelief | None":
+        """What is believed of an object; None where nobody has given an interval.
+
+        Raises
+        ------
+        BeliefError: there is no such object.
+        """
+        found = cls(*(belief.interval(item, quantity) for quantity in CONTACT_QUANTITIES))
+        return None if found.exact else found
 
     @property
     def exact(self) -> bool:
@@ -59,7 +75,8 @@ def certified_limits(
 
     Returns
     -------
-    None where not even the straight push is certified.
+    None where not even the straight push is certified, and where the intervals of the centre of
+    mass reach beyond the object.
 
     Raises
     ------
@@ -74,7 +91,10 @@ def certified_limits(
     along = float(-nominal.start @ nominal.tangent) + float(centred.centre[1])
     low, high = -math.inf, math.inf
     for com in belief.centres():
-        spec = replace(item, com=com)
+        try:
+            spec = replace(item, com=com)
+        except SettingsError:  # outside the object
+            return None
         moved = next((s for s in pushable_sides(spec.geometry, robot) if s.index == side), None)
         if moved is None:
             return None
@@ -85,6 +105,22 @@ def certified_limits(
         low, high = max(low, limits.minimum), min(high, limits.maximum)
     factor = 1.0 if belief.com_x.width == belief.com_y.width == 0.0 else BEND
     return CurvatureLimits(factor * low, factor * high)
+
+
+def trusted_limits(
+    stable: CurvatureLimits, trust: float, certified: CurvatureLimits | None
+) -> CurvatureLimits:
+    """Curvatures that may be used: a fraction of the stable ones, or the certified ones where these
+    allow more.
+
+    stable: of the believed values. trust: fraction of them. certified: None where there are none.
+    """
+    part = stable.scaled(trust)
+    if certified is None:
+        return part
+    return CurvatureLimits(
+        min(part.minimum, certified.minimum), max(part.maximum, certified.maximum)
+    )
 
 
 def stick_margin(

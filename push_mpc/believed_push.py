@@ -10,6 +10,7 @@ from push_model.pushable_sides import pushable_sides
 from push_model.shapes import Side
 from push_model.specs import ObjectSpec, RobotSpec
 from push_model.stable_push import contact_on_side, curvature_limits
+from push_model.stick_certificate import ContactBelief, certified_limits
 from push_mpc.line_contact import line_contact
 from push_mpc.task import Push
 
@@ -20,11 +21,15 @@ class Unstable(Exception):
     """Raised when not even a straight push is stable; says why."""
 
 
-def believed_push(push: Push, robot: RobotSpec, item: ObjectSpec) -> Push:
+def believed_push(
+    push: Push, robot: RobotSpec, item: ObjectSpec, believed: ContactBelief | None
+) -> Push:
     """The push with the stable curvatures and the contact that follow from robot and object.
 
     The side is the one whose nominal contact lies nearest to the push's; its curvatures are those
     of the stable-push analysis (S3). Where the contact lies at no side, the limits stay.
+
+    believed: intervals of friction and centre of mass, for the certified curvatures; None without.
 
     Raises
     ------
@@ -43,7 +48,10 @@ def believed_push(push: Push, robot: RobotSpec, item: ObjectSpec) -> Push:
             f"with a contact friction of {item.contact_friction:g} not even a straight push is "
             "stable"
         )
-    return replace(push, limits=limits, line=line)
+    certified = None if believed is None else certified_limits(item, robot, believed, side.index)
+    return replace(
+        push, limits=limits, line=line, uncertain=believed is not None, certified=certified
+    )
 
 
 def nearest_side(push: Push, robot: RobotSpec, item: ObjectSpec) -> Side | None:

@@ -14,9 +14,9 @@ from push_estimation.pose_gate import PoseGateSettings
 from push_model.arrays import Array
 from push_model.belief import POSES
 from push_model.settings import SettingsError
+from push_model.stick_certificate import ContactBelief
 from push_mpc import Push, Task, Tick, TrackerSettings, TrajectoryTracker, controller_kind
 from push_mpc.believed_push import Unstable, believed_push
-from push_mpc.certified_push import PushCertificate
 from push_mpc.follower_node import Command, Followed, FollowerKind, FollowerNode
 from push_mpc.line_contact import line_contact
 from push_mpc.other_bodies import kept_off
@@ -60,7 +60,6 @@ class VelocityFollower:
         self.bodies: Collection[str] = {robot, *self._scenario.objects, *self._others}
         self._object = ""
         self._told_push: Push | None = None  # as it was planned
-        self._certificate: PushCertificate | None = None
         self._alarmed = False  # in this push
         self._beliefs = BeliefFeed(
             shell, names, self._scenario, diagnostics, lambda belief: self._take_up()
@@ -113,14 +112,11 @@ class VelocityFollower:
         delay = self._tracker_settings.pose_delay
         if (POSES, "latency") in belief.values:
             delay = belief.latency.value
-        push, self._certificate = None, None
-        if told is not None and belief.values:
-            robot = belief.robot(self._robot)
-            self._certificate = PushCertificate(told, robot, belief, self._object)
+        push = None
         if self.tracker.active and told is not None:
             item, robot = belief.object(self._object), belief.robot(self._robot)
             try:
-                push = believed_push(told, robot, item)
+                push = believed_push(told, robot, item, ContactBelief.of(belief, self._object))
             except Unstable as error:
                 self._shell.end(FollowTrajectory.Result.SOLVER_FAILED, str(error))
         self.tracker.believe(push, delay)
@@ -156,7 +152,7 @@ class VelocityFollower:
     def begin(self, request: Any, task: Task) -> None:
         """See Follower."""
         self._object, self._told_push = request.object, task.push
-        self._certificate, self._alarmed = None, False
+        self._alarmed = False
         self.tracker.start(task)
         if self._beliefs.current.values:
             self._take_up()
@@ -179,6 +175,9 @@ class VelocityFollower:
             item = poses.pose(self._object)
         age = poses.gate.age(self._robot)
         tick = self.tracker.tick(dt, robot, item, self._around(robot), age)
+        if tick.alarm and not tick.finished and not self._alarmed:
+            self._alarmed = True
+            self._shell.get_logger().warning(tick.alarm)
         failed = tick.solve is not None and not tick.solve.solved
         return Followed(
             (tick.v, tick.omega),
@@ -224,16 +223,10 @@ class VelocityFollower:
     def show(self, followed: Followed) -> None:
         """See Follower: the report."""
         shell = self._shell
-        if shell.poses.stamp - self._reported < _REPORTS - 1e-9:
+        if not followed.finished and shell.poses.stamp - self._reported < _REPORTS - 1e-9:
             return
         self._reported = shell.poses.stamp
-        tick, margin = followed.tick, math.nan
-        if self._certificate is not None:
-            margin = self._certificate.margin(tick.v, tick.omega, tick.object_offset)
-            if self._certificate.alarm and not self._alarmed:
-                self._alarmed = True
-                shell.get_logger().warning(self._certificate.alarm)
-        report = tick_report(tick, self._told_push is not None, margin)
+        report = tick_report(followed.tick, self._told_push is not None)
         self._reports.publish(report_to_ros(report, shell.stamp, self._controller, self._object))
 
 

@@ -134,6 +134,19 @@ class TrackerSettings:
     friction_trust: float = bounded(
         0.85, low=0.1, high=1.0, doc="Fraction of the stable curvature that the controller may use"
     )
+    slip_warning: float = bounded(
+        1.0,
+        low=0.0,
+        high=60.0,
+        doc="Time by which the path of a push is looked ahead for a bend on which the object is "
+        "expected to slip, once another friction or centre of mass is believed than at the start "
+        "of the job (s)",
+    )
+    stop_before_slip: bool = bounded(
+        True,
+        doc="Whether a push ends before such a bend, so that a new plan is made; otherwise there "
+        "is only a warning",
+    )
     pose_delay: float = bounded(
         0.0, low=0.0, high=1.0, doc="Latency of the pose stream that is compensated (s)"
     )

@@ -1,5 +1,6 @@
 """Input of a tracker, and its output in each tick."""
 
+import math
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -21,6 +22,7 @@ class TrackError(IntEnum):
     OFF_COURSE = 205
     SOLVER_FAILED = 206
     TIMEOUT = 207
+    SLIP_EXPECTED = 211
 
 
 @dataclass(frozen=True)
@@ -28,12 +30,16 @@ class Push:
     """Data of a push in addition to its trajectory.
 
     grasp: ``(3,)`` nominal pose of the object in the robot frame; limits: stable curvatures for it;
-    line: where the bumper touches it; None if unknown or not a line.
+    line: where the bumper touches it; None if unknown or not a line. uncertain: whether intervals
+    of friction and centre of mass are believed; certified: curvatures that are stable for all of
+    them, None if there are none.
     """
 
     grasp: Array
     limits: CurvatureLimits
     line: LineContact | None = None
+    uncertain: bool = False
+    certified: CurvatureLimits | None = None
 
 
 @dataclass(frozen=True)
@@ -49,7 +55,12 @@ class Task:
 
 @dataclass(frozen=True)
 class Tick:
-    """Outcome of one tick: command, and whether the task has ended, and how."""
+    """Outcome of one tick: command, and whether the task has ended, and how.
+
+    stick_margin: [rad/s] see ``push_model.stick_certificate``; nan where no interval is believed,
+    or the robot stands. slip_in: [s] after which the object is expected to slip on the path ahead;
+    nan if it is not. alarm: the same in words, empty if it is not.
+    """
 
     v: float
     omega: float
@@ -64,3 +75,6 @@ class Tick:
     curvature_margin: float
     obstacle_margin: float
     object_offset: float
+    stick_margin: float = math.nan
+    slip_in: float = math.nan
+    alarm: str = ""

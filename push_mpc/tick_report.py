@@ -9,12 +9,8 @@ _LEAST = 10.0  # [rad/s] not less is shown, also where not even a straight push 
 _FAR = 50.0  # [1/m] a margin above this is free motion
 
 
-def tick_report(tick: Tick, pushing: bool, stick_margin: float = math.nan) -> Report:
-    """Errors, margins and speed of a tick.
-
-    pushing: whether an object is pushed. stick_margin: [rad/s] see ``certified_push.py``; nan where
-    nothing is certified, because no interval is believed.
-    """
+def tick_report(tick: Tick, pushing: bool) -> Report:
+    """Errors, margins and speed of a tick. pushing: whether an object is pushed."""
     margin = tick.curvature_margin if tick.curvature_margin < _FAR else math.nan
     figures = [
         Figure("error along the way", float(tick.error[0]), "m"),
@@ -28,7 +24,9 @@ def tick_report(tick: Tick, pushing: bool, stick_margin: float = math.nan) -> Re
     if pushing:
         figures.append(Figure("curvature margin", margin, "1/m", 0.0))
         figures.append(Figure("object aside", tick.object_offset, "m"))
-        if not math.isnan(stick_margin):
-            figures.append(Figure("stick margin", max(stick_margin, -_LEAST), "rad/s", 0.0))
+        if not math.isnan(tick.stick_margin):
+            figures.append(Figure("stick margin", max(tick.stick_margin, -_LEAST), "rad/s", 0.0))
+        if not math.isnan(tick.slip_in):
+            figures.append(Figure("slip expected in", tick.slip_in, "s"))
     solve = 0.0 if tick.solve is None else tick.solve.solve_time
     return Report("push" if pushing else "move", tuple(figures), (), solve)

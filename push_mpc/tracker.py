@@ -17,7 +17,8 @@ import numpy as np
 from push_estimation.dead_reckoning import DeadReckoning
 from push_model import se2
 from push_model.arrays import Array
-from push_model.stable_push import shifted_limits
+from push_model.stable_push import CurvatureLimits, shifted_limits
+from push_model.stick_certificate import stick_margin, trusted_limits
 from push_mpc.checks import EndCheck, FailureCheck
 from push_mpc.command import Command
 from push_mpc.controller import Contact, MpcResult, PredictiveController, Reference
@@ -28,6 +29,9 @@ from push_mpc.task import Push, Task, Tick, TrackError
 
 _NO_CIRCLES = np.zeros((0, 3))
 _REACH = 1.5  # times the distance of the horizon at full speed: farther obstacles cannot matter
+_PUSHING = 0.005  # [m/s] below which a push has no curvature that matters
+_LOOK = 0.1  # [s] between poses of the path ahead
+_EXCESS = 0.02  # of the turn rate: less is not told from rounding
 _MOVING = 1e-3  # [m/s]: below it, omega / v is noise, not curvature
 
 
@@ -75,7 +79,7 @@ class TrajectoryTracker:
     def believe(self, push: Push | None, delay: float) -> None:
         """Go on with another belief: of the push under way, and of the latency [s] of the poses."""
         if self._task is not None and push is not None:
-            self._task = replace(self._task, push=push)
+            self._task, self._changed = replace(self._task, push=push), True
         self._reckoning.delay = delay
 
     def warm_up(self) -> None:
@@ -93,6 +97,7 @@ class TrajectoryTracker:
         )
         self._end = EndCheck(self.settings, task)
         self._failure = FailureCheck(self.settings, self.controller.drive.half_track)
+        self._changed = False  # whether another belief has come than the task was planned with
         self._lag = 0.0  # [m] behind the reference in the previous tick
         self._command.start()
         self.controller.reset()
@@ -162,6 +167,11 @@ class TrajectoryTracker:
         code, message = self._failure.verdict(
             dt, robot, (self.v, self.omega), error, grasp, self._clock.halted
         )
+        slip_in, alarm = math.nan, ""
+        if limits is not None and self._changed:
+            slip_in, alarm = self._slip_ahead(limits)
+        if alarm and code is TrackError.NONE and self.settings.stop_before_slip:
+            code, message = TrackError.SLIP_EXPECTED, alarm
         solve: MpcResult | None = None
         finished = code is not TrackError.NONE
         if (
@@ -180,7 +190,9 @@ class TrajectoryTracker:
                 finished, code, message = True, TrackError.SOLVER_FAILED, solve.reason
                 self.stop()
         self._in_force = (self.v, self.omega)
-        curvature_margin = math.inf
+        curvature_margin, margin, push = math.inf, math.nan, task.push
+        if grasp is not None and push is not None and push.uncertain and self.v > _PUSHING:
+            margin = stick_margin(push.certified, self.v, self.omega, grasp.offset)
         if limits is not None and self.v > _MOVING:
             kappa = self.omega / self.v
             curvature_margin = min(limits.maximum - kappa, kappa - limits.minimum)
@@ -198,12 +210,37 @@ class TrajectoryTracker:
             curvature_margin,
             float(room.min(initial=math.inf)),
             0.0 if grasp is None else grasp.offset,
+            margin,
+            slip_in,
+            alarm,
+        )
+
+    def _slip_ahead(self, limits: CurvatureLimits) -> tuple[float, str]:
+        """In how many seconds the object would slip on the path ahead, and why; nan and empty if it
+        sticks, as far as is believed.
+
+        limits: curvatures that the controller may use, which it will not exceed.
+        """
+        times = self._clock.time + np.arange(0.0, self.settings.slip_warning + 1e-9, _LOOK)
+        _, twist = self._clock.trajectory.sample(times)
+        v, omega = twist.T
+        excess = np.maximum(omega - limits.maximum * v, limits.minimum * v - omega)
+        slips = np.flatnonzero((v > _PUSHING) & (excess > _EXCESS * np.abs(omega)))
+        if not len(slips):
+            return math.nan, ""
+        first = slips[0]
+        kappa = omega[first] / v[first]
+        limit = limits.maximum if kappa > 0.0 else limits.minimum
+        return first * _LOOK, (
+            f"the object is expected to slip in {first * _LOOK:.1f} s: the path has a curvature of "
+            f"{kappa:.2f} 1/m there, and at most {limit:.2f} 1/m is stable for what is believed now"
         )
 
     def _contact(self, push: Push, grasp: GraspEstimate) -> Contact:
         """The contact at the object's actual place, with the trusted part of its friction."""
         trust = self.settings.friction_trust
-        limits = shifted_limits(push.limits.scaled(trust), grasp.offset)
+        trusted = trusted_limits(push.limits, trust, push.certified)
+        limits = shifted_limits(trusted, grasp.offset)
         if push.line is None:
             return Contact(limits)
         return Contact(limits, push.line.trusted(trust).moved(*grasp.away))

@@ -44,7 +44,7 @@ def plan_among_bodies(
     if len(circles):
         margin = settings.safety_distance
         grid = with_bodies(scene.field.grid, circles, scene.item.outline, start, margin)
-        planner = PushPlanner(settings, grid, scene.robot, scene.item)
+        planner = PushPlanner(settings, grid, scene.robot, scene.item, scene.believed)
     if preemptive:
         return plan_after_preemptive_push(planner, start, goal, settings.seed + preemptive, robot)
     return planner.plan(start, goal, robot=robot)

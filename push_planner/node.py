@@ -14,6 +14,7 @@ from rclpy.node import Node
 from push_model.arrays import Array
 from push_model.occupancy import OccupancyGrid as Grid
 from push_model.settings import SettingsError
+from push_model.stick_certificate import ContactBelief
 from push_msgs.action import PlanPush
 from push_msgs.msg import PushPlan as PlanMessage
 from push_msgs.srv import PlanRobotPath
@@ -145,7 +146,9 @@ class PlannerNode(Node):
         key = (robot, item)
         if key not in self._planners:
             try:
-                planner = PushPlanner(self.settings, self._distances(), robot_spec, item_spec)
+                believed = ContactBelief.of(belief, item)
+                specs = robot_spec, item_spec, believed
+                planner = PushPlanner(self.settings, self._distances(), *specs)
             except SettingsError as error:
                 why = f"robot '{robot}' cannot push '{item}': {error}"
                 raise PlanningFailed(PlanError.NO_PUSH_SEQUENCE, why) from None

@@ -12,6 +12,7 @@ from push_model.distance_field import DistanceField
 from push_model.occupancy import OccupancyGrid
 from push_model.push_segment import PushSegment
 from push_model.specs import ObjectSpec, RobotSpec
+from push_model.stick_certificate import ContactBelief
 from push_planner.candidate_poses import along_guide, manoeuvres, nearby, runs, scattered
 from push_planner.cost_bound import CostBound
 from push_planner.guide_path import GuidePath, NoGuidePath, guide_paths, origin_floor
@@ -117,14 +118,16 @@ class PushPlanner:
         grid: OccupancyGrid | DistanceField,
         robot: RobotSpec,
         item: ObjectSpec,
+        believed: ContactBelief | None = None,
     ) -> None:
         """Raises SettingsError where the robot cannot push: no flat bumper, no two wheels.
 
-        grid: the map, or its distance field where that has been made already.
+        grid: the map, or its distance field where that has been made already. believed: intervals
+        of friction and centre of mass, where somebody has given some.
         """
         self.settings = settings
         field = grid if isinstance(grid, DistanceField) else DistanceField(grid)
-        self.scene = PushScene(field, robot, item, settings)
+        self.scene = PushScene(field, robot, item, settings, believed)
 
     def check(self, pose: Array, what: str, occupied: PlanError) -> None:
         """Raise PlanningFailed unless the object can stand at the pose ``(3,)``."""

@@ -23,6 +23,7 @@ from push_model.stable_push import (
     contact_on_side,
     curvature_limits,
 )
+from push_model.stick_certificate import ContactBelief, certified_limits, trusted_limits
 from push_planner.push_curve import PushCurve
 from push_planner.push_sweep import SWEEP_LOSS, push_clearance, rooms_behind
 from push_planner.settings import PlannerSettings
@@ -56,8 +57,17 @@ class PushSide:
         return se2.compose(object_pose, se2.inverse(self.grasp))
 
 
-def push_sides(robot: RobotSpec, item: ObjectSpec, friction_trust: float) -> tuple[PushSide, ...]:
+def push_sides(
+    robot: RobotSpec,
+    item: ObjectSpec,
+    friction_trust: float,
+    believed: ContactBelief | None = None,
+    certified_trust: float = 1.0,
+) -> tuple[PushSide, ...]:
     """The sides that the robot reaches and on which at least the straight push is stable (S3).
+
+    believed: intervals of what the curvatures depend on; a side's trusted curvatures are then at
+    least the fraction ``certified_trust`` of those that are stable for all of the intervals.
 
     Raises
     ------
@@ -70,7 +80,10 @@ def push_sides(robot: RobotSpec, item: ObjectSpec, friction_trust: float) -> tup
         contact = contact_on_side(side, robot.flat_bumper.width)
         limits = curvature_limits(contact, robot.push_distance, item.contact_friction, surface)
         if limits is not None:
-            trusted = limits.scaled(friction_trust)
+            sure = None
+            if believed is not None:
+                sure = certified_limits(item, robot, believed, side.index)
+            trusted = trusted_limits(limits, friction_trust, sure and sure.scaled(certified_trust))
             grasp = contact.object_pose + ahead
             sides.append(PushSide(side.index, contact, limits, trusted, grasp, side.depth))
     return tuple(sides)
@@ -80,16 +93,27 @@ class PushScene:
     """Collision questions of the planner."""
 
     def __init__(
-        self, field: DistanceField, robot: RobotSpec, item: ObjectSpec, settings: PlannerSettings
+        self,
+        field: DistanceField,
+        robot: RobotSpec,
+        item: ObjectSpec,
+        settings: PlannerSettings,
+        believed: ContactBelief | None = None,
     ) -> None:
-        """Raises SettingsError where the robot cannot push: no flat bumper, no two wheels."""
+        """Raises SettingsError where the robot cannot push: no flat bumper, no two wheels.
+
+        believed: intervals of friction and centre of mass, see ``push_sides``.
+        """
         self.field = field
         self.robot = robot
         self.item = item
         self.settings = settings
         self.drive = robot.differential
         self.shape = item.geometry
-        self.sides = push_sides(robot, item, settings.friction_trust)
+        self.believed = believed
+        self.sides = push_sides(
+            robot, item, settings.friction_trust, believed, settings.certified_trust
+        )
         self._object_points = self.shape.dense_outline(_OUTLINE_SPACING)
         self._robot_points = densified(robot.outline, _OUTLINE_SPACING)
         self._robot_radius = float(np.hypot(*robot.outline.T).max())

@@ -126,6 +126,14 @@ class PlannerSettings:
         doc="Fraction of the stable curvature that plans may use; the rest is a margin for "
         "lower friction (dimensionless)",
     )
+    certified_trust: float = bounded(
+        0.9,
+        low=0.1,
+        high=1.0,
+        doc="Fraction that plans may use of the curvatures that are stable for all frictions and "
+        "centres of mass within the believed intervals; used where it allows more than "
+        "friction_trust (dimensionless)",
+    )
     safety_distance: float = bounded(
         0.012,
         low=0.0,

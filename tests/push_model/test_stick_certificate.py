@@ -5,12 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from push_model.belief import Interval
+from push_model.belief import Belief, Interval
 from push_model.pushable_sides import pushable_sides
 from push_model.settings import SettingsError
 from push_model.shape_specs import PolygonShape
 from push_model.stable_push import CurvatureLimits, contact_on_side, curvature_limits
-from push_model.stick_certificate import ContactBelief, certified_limits, stick_margin
+from push_model.stick_certificate import (
+    ContactBelief,
+    certified_limits,
+    stick_margin,
+    trusted_limits,
+)
 
 
 def drawn(rng, item):
@@ -93,3 +98,25 @@ def test_the_margin_is_the_turn_rate_that_is_left():
     right = stick_margin(limits, 0.1, 0.15, offset=-0.1)
     assert right == pytest.approx(0.1), "further right, the object may be turned left more tightly"
     assert stick_margin(None, 0.1, 0.0) == -np.inf
+
+
+def test_what_may_be_used_is_the_greater_of_the_trusted_part_and_of_what_is_certain():
+    stable = CurvatureLimits(-2.0, 1.0)
+    assert trusted_limits(stable, 0.75, None) == CurvatureLimits(-1.5, 0.75)
+    assert trusted_limits(stable, 0.75, CurvatureLimits(-1.8, 0.5)) == CurvatureLimits(-1.8, 0.75)
+
+
+def test_a_belief_without_intervals_is_none(box, robot):
+    belief = Belief({"box": box}, {"me": robot})
+    assert ContactBelief.of(belief, "box") is None
+    exact = belief.updated({("box", "contact_friction"): Interval.exact(0.3)})
+    assert ContactBelief.of(exact, "box") is None
+    some = belief.updated({("box", "com_x"): Interval(0.0, -0.01, 0.01)})
+    found = ContactBelief.of(some, "box")
+    assert found is not None and found.com_x.high == 0.01
+    assert found.friction == Interval.exact(box.contact_friction)
+
+
+def test_a_centre_of_mass_that_may_lie_outside_certifies_nothing(box, robot):
+    wide = ContactBelief(Interval.exact(0.2), Interval(0.0, -0.2, 0.2), Interval.exact(0.0))
+    assert certified_limits(box, robot, wide, 0) is None

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from push_model import SettingsError, se2
+from push_model.belief import Interval
 from push_model.occupancy import rasterise
 from push_model.outlines import distance
 from push_model.pushable_sides import pushable_sides
 from push_model.settings import from_mapping
 from push_model.specs import BoxSpec, EnvironmentSpec, ObjectSpec
+from push_model.stick_certificate import ContactBelief, certified_limits
 from push_planner import PlanError, PlannerSettings, PlanningFailed, PushPlanner, push_sides
 from push_scenario.scenario import load_scenario
 
@@ -147,3 +149,32 @@ def test_robots_that_cannot_push_are_refused(box):
         PushPlanner(QUICK, GRID, ring, box)
     with pytest.raises(SettingsError, match="two driven wheels"):
         PushPlanner(QUICK, GRID, disc, box)
+
+
+def test_plans_turn_more_tightly_where_friction_is_known_and_not_less_where_it_is_not(robot):
+    """The certified curvatures replace the trusted part of the stable ones where they allow more;
+    a wide interval leaves the plan as it was."""
+    item, exact = item_of(BOX), (Interval.exact(0.0), Interval.exact(0.0))
+    plain = PushPlanner(QUICK, GRID, robot, item)
+    known = ContactBelief(Interval(0.2, 0.19, 0.21), *exact)
+    vague = ContactBelief(Interval(0.2, 0.08, 0.5), *exact)
+    sure, unsure = (PushPlanner(QUICK, GRID, robot, item, b) for b in (known, vague))
+    for before, tight, same in zip(
+        plain.scene.sides, sure.scene.sides, unsure.scene.sides, strict=True
+    ):
+        assert same.trusted == before.trusted
+        certified = certified_limits(item, robot, known, before.index)
+        assert tight.trusted.maximum == pytest.approx(0.9 * certified.maximum)
+        assert before.trusted.maximum < tight.trusted.maximum < certified.maximum
+    random, cheaper = np.random.default_rng(3), []
+    for _ in range(10):
+        start, goal = random.uniform([-1.2, -0.7, -np.pi], [1.2, 0.7, np.pi], (2, 3))
+        first, second = (p.solve(start, goal) for p in (plain, sure))
+        assert unsure.solve(start, goal).cost == first.cost
+        for segment in second.segments:
+            (side,) = (s for s in sure.scene.sides if s.index == segment.side)
+            v, omega = segment.trajectory.twist.T
+            bends = np.abs(omega[v > 0.01] / v[v > 0.01])
+            assert bends.max() <= side.trusted.maximum + 1e-6
+        cheaper.append(second.cost / first.cost)
+    assert np.median(cheaper) < 0.98

@@ -54,6 +54,30 @@ def test_planner_and_controller_take_up_a_friction(single):
     assert single.controller.tracker.push.limits == after, "what another source said stays"
 
 
+def test_a_push_that_is_expected_to_slip_ends_and_is_planned_anew():
+    """A friction that lets the planned bend slip arrives while the robot is still on its way."""
+    scenario = load_scenario("line").settings("bridge", world="planar")
+    start = scenario.objects["box"][1]
+    with LockstepRun(scenario, quiet=True) as run:
+        run.start()
+        job, seen = run.teams[""], []
+        job.send_goal(start + np.array([1.5, 0.5, 0.5]))
+        run.spin_until(lambda: run.observer.state.state == JobState.PUSHING, 60.0)
+        before = run.planner._planner("", "box").scene.sides[0].trusted
+        tell(run, {("box", "contact_friction"): (0.1, 0.09, 0.11)})
+
+        def ended():
+            seen.append(run.observer.state.reason)
+            return job.ended
+
+        assert run.spin_until(ended, 120.0)
+        state = run.observer.state
+        assert any("expected to slip" in reason for reason in seen)
+        assert state.error_code == 0 and state.replans == 1
+        after = run.planner._planner("", "box").scene.sides[0].trusted
+        assert after.maximum < 0.7 * before.maximum
+
+
 def test_what_cannot_be_believed_is_refused_and_changes_nothing(single):
     item = next(iter(single.scenario.objects))
     tell(single, {(item, "contact_friction"): (0.3, 0.2, 0.4)})
