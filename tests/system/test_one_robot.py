@@ -87,10 +87,17 @@ def test_a_belief_published_in_mid_push_changes_its_limits_in_the_next_frame():
         tracker = method._drive.tracker
         assert run.spin_until(lambda: tracker.push is not None, 1.0)
         before = tracker.push.limits.maximum
-        values = {(OBJECT, "contact_friction"): Interval.exact(0.5 * friction)}
-        said.publish(belief_to_ros("person", values))
-        assert run.spin_until(lambda: tracker.push.limits.maximum < 0.6 * before, 0.1)
-        assert tracker.push.limits.maximum == pytest.approx(0.5 * before, rel=0.05)
+
+        def tell(part):
+            values = {(OBJECT, "contact_friction"): Interval.exact(part * friction)}
+            said.publish(belief_to_ros("person", values))
+
+        tell(0.9)  # the object still sticks on the way that is planned
+        assert run.spin_until(lambda: tracker.push.limits.maximum < 0.95 * before, 0.1)
+        assert tracker.push.limits.maximum == pytest.approx(0.9 * before, rel=0.05)
+        tell(0.5)  # and now no more
+        machine = method.machine
+        assert run.spin_until(lambda: "expected to slip" in machine.reason, 1.0)
         assert run.spin_until(lambda: run.teams[""].ended, 60.0)
         assert run.observer.state.error_code == 0 and run.observer.state.system == "one-robot"
 
