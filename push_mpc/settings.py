@@ -139,8 +139,7 @@ class TrackerSettings:
         low=0.0,
         high=60.0,
         doc="Time by which the path of a push is looked ahead for a bend on which the object is "
-        "expected to slip, once another friction or centre of mass is believed than at the start "
-        "of the job (s)",
+        "expected to slip, once a belief has been published (s)",
     )
     stop_before_slip: bool = bounded(
         True,

@@ -97,7 +97,7 @@ class TrajectoryTracker:
         )
         self._end = EndCheck(self.settings, task)
         self._failure = FailureCheck(self.settings, self.controller.drive.half_track)
-        self._changed = False  # whether another belief has come than the task was planned with
+        self._changed = False  # whether a belief was taken up in this task
         self._lag = 0.0  # [m] behind the reference in the previous tick
         self._command.start()
         self.controller.reset()

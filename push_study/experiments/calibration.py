@@ -67,14 +67,19 @@ class CalibrationTask:
         return Path(self.out) / f"trace-{Path(self.scenario).stem}-{self.kind}-{self.seed}.npz"
 
 
+def one_of_each(name: str) -> Scenario:
+    """A scenario with one robot and one object; raises SettingsError for another one."""
+    scenario = load_scenario(name)
+    if len(scenario.robots) != 1 or len(scenario.objects) != 1:
+        raise SettingsError(f"scenario '{name}' needs one robot and one object")
+    return scenario
+
+
 def tasks(options: StudyOptions) -> list[CalibrationTask]:
     """An ordinary and a probing push with equal draws, as often as there are trials."""
     made = []
     for name in options.scenarios:
-        scenario = load_scenario(name)
-        if len(scenario.robots) != 1 or len(scenario.objects) != 1:
-            raise SettingsError(f"scenario '{name}' needs one robot and one object")
-        text = digest(scenario)
+        text = digest(one_of_each(name))
         made += [
             CalibrationTask(
                 name,

@@ -5,11 +5,11 @@ A probing push of each draw gives the intervals of the estimator. A job with the
 three times:
 
 - ``untold``: planned and driven with the values of the files.
-- ``answered``: the same, but the belief arrives when the plan is made. A push ends before it is
-  expected to slip, and a new plan is made.
+- ``answered``: the same, but the belief, also that of the latency, arrives when the plan is made.
+  A push ends before it is expected to slip, and a new plan is made.
 - ``told``: the belief is there before the goal, so that all plans are made with it.
 
-Up to the alarm, the jobs ``untold`` and ``answered`` are the same. The alarm of the one is
+Up to the alarm, the jobs ``untold`` and ``answered`` follow the same plan. The alarm of the one is
 therefore compared with the slip of the other.
 """
 
@@ -28,18 +28,17 @@ import numpy as np
 from push_model import se2
 from push_model.arrays import Array
 from push_model.belief import Interval
-from push_model.settings import SettingsError
 from push_msgs.msg import Belief, JobState, Report
 from push_ros.claims import own_domain
 from push_ros.conversions import time_from_ros
 from push_ros.names import Names
 from push_ros.qos import BELIEF, STATUS
 from push_ros.report_conversions import belief_to_ros
-from push_scenario.scenario import Scenario, load_scenario
+from push_scenario.scenario import Scenario
 from push_study import probing
-from push_study.experiments.calibration import CalibrationTask, drawn_worlds
+from push_study.experiments.calibration import CalibrationTask, drawn_worlds, one_of_each
 from push_study.graph_run import LockstepRun
-from push_study.job import digest
+from push_study.job import SUCCESS_ORIENTATION, SUCCESS_POSITION, digest
 from push_study.observer import Trace, final_errors
 from push_study.pool import Row
 from push_study.study import StudyOptions
@@ -58,7 +57,7 @@ _AHEAD_OF = ([0.9, 0.3, 0.5], [1.5, 0.8, 1.4])  # [m, m, rad] goals from the sta
 _ALARM = "slip expected in"  # name of the figure in the report
 _AFTER_PLAN = (JobState.POSITIONING, JobState.APPROACH, JobState.PUSHING)
 _LIMIT = 120.0  # [s] of sim time of a job
-_POSITION, _ORIENTATION = 0.02, 0.1  # [m], [rad] of a success
+_SETTLED = 10  # frames of 10 ms after which bumper and object touch
 
 
 @dataclass(frozen=True)
@@ -74,7 +73,7 @@ class CertificateTask:
 
     @property
     def trace_file(self) -> Path:
-        """Where the watched job leaves its alarm and its slip."""
+        """Where jobs with an alarm before a slip leave their course."""
         return Path(self.out) / f"trace-{Path(self.scenario).stem}-{self.seed}.npz"
 
     @property
@@ -89,10 +88,8 @@ def tasks(options: StudyOptions) -> list[CertificateTask]:
     """A draw for each trial."""
     made = []
     for name in options.scenarios:
-        scenario = load_scenario(name)
-        if len(scenario.robots) != 1 or len(scenario.objects) != 1:
-            raise SettingsError(f"scenario '{name}' needs one robot and one object")
-        common = options.uncertainty, options.world or OPTIONS["world"], digest(scenario)
+        world = options.world or OPTIONS["world"]
+        common = options.uncertainty, world, digest(one_of_each(name))
         made += [
             CertificateTask(name, seed, str(options.out), *common)
             for seed in range(options.seed, options.seed + options.trials)
@@ -121,12 +118,12 @@ def slips(trace: Trace) -> list[tuple[float, float]]:
     stamps = np.array(trace.time)
     for (begin, state, *_), end in zip(trace.states, bounds[1:], strict=True):
         first, last = np.searchsorted(stamps, [begin, end])
-        if state != "PUSHING" or last - first < 20:
+        if state != "PUSHING" or last - first < 2 * _SETTLED:
             continue
         seen = range(first, last)
         places = np.array([se2.between(trace.robot[k], trace.object[k]) for k in seen])
-        aside = np.abs(places[:, 1] - places[10, 1])  # from 0.1 s on, when they touch
-        aside[:10] = 0.0
+        aside = np.abs(places[:, 1] - places[_SETTLED, 1])
+        aside[:_SETTLED] = 0.0
         if aside.max() > SLIPPED:
             begun = np.flatnonzero(aside[: int(aside.argmax())] < BEGUN)[-1]
             found.append((float(stamps[first + begun]), float(aside.max())))
@@ -196,7 +193,9 @@ def job(
     slipped = slips(trace)
     reached = team.ended and int(state.error_code) == 0
     row: Row = {
-        "success": bool(reached and position <= _POSITION and orientation <= _ORIENTATION),
+        "success": bool(
+            reached and position <= SUCCESS_POSITION and orientation <= SUCCESS_ORIENTATION
+        ),
         "error_m": position,
         "error_rad": orientation,
         "slipped": bool(slipped),
