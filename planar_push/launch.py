@@ -26,7 +26,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--estimate",
         action="store_true",
-        help="estimate contact friction, centre of mass and latency while a single robot pushes",
+        help="estimate while robots push: contact friction, centre of mass and latency with one "
+        "robot, the outline of the object with several",
     )
     add_factor(parser)
     add_namespace(parser)
@@ -36,14 +37,16 @@ def run(arguments: argparse.Namespace) -> int:
     """Check everything, then start."""
     from push_bringup.launcher import Child, Launcher
     from push_bringup.preparation import check_domain, prepare
+    from push_bringup.systems import estimated
+    from push_scenario.scenario import load_scenario
 
+    scenario = load_scenario(scenario_of(arguments))
     setup = prepare(
-        scenario_of(arguments),
+        estimated(arguments.system, scenario) if arguments.estimate else scenario,
         system=arguments.system,
         namespace=arguments.namespace,
         record=arguments.record,
         factor=arguments.factor,
-        parameters={"estimator": {"enabled": True}} if arguments.estimate else None,
     )
     check_domain(setup.namespace)
     with tempfile.TemporaryDirectory("-planar-push") as folder:

@@ -17,8 +17,10 @@ from grasp_opt.group_method import GROUP
 from grasp_opt.placement import PlacementSettings
 from grasp_opt.step_settings import StepSettings
 from lab_bridge.settings import LabBridgeSettings
+from push_estimation.outline_estimate import OutlineSettings
 from push_estimation.pose_gate import PoseGateSettings
 from push_estimation.push_belief import PushPriorSettings
+from push_estimation.stopped_robots import StoppedSettings
 from push_estimation.stream_latency import LatencySettings
 from push_job.method import MethodSpec, method_names, method_spec
 from push_model.settings import SettingsError
@@ -29,6 +31,7 @@ from push_mpc.torque_tracker import TorqueTrackerSettings
 from push_mpc.wheel_slip_nmpc import WheelSlipSettings
 from push_planner import PlannerSettings
 from push_ros.estimator_node import EstimatorSettings
+from push_ros.outline_node import OutlineNodeSettings
 from push_ros.roster import RosterSettings
 from push_scenario.scenario import Scenario
 from push_supervisor import SupervisorSettings
@@ -250,6 +253,14 @@ KINDS: dict[str, NodeKind] = {
         _robot_and_object,
         ("world", "robot", "object"),
         {"": EstimatorSettings, "push": PushPriorSettings, "latency": LatencySettings, **_GATED},
+        listens=1,
+    ),
+    "outline_estimator": NodeKind(
+        "push_ros.outline_node",
+        "OutlineNode",
+        _team,
+        _TEAM,
+        {"": OutlineNodeSettings, "outline": OutlineSettings, "stopped": StoppedSettings, **_GATED},
         listens=1,
     ),
     "recorder": NodeKind(

@@ -14,6 +14,7 @@ from typing import Any
 from grasp_opt.group_method import GROUP
 from push_bringup.node_kinds import NodeSpec
 from push_job.method import method_names, method_spec
+from push_model.bumpers import RingBumper
 from push_model.drives import TorqueDrive
 from push_model.settings import SettingsError
 from push_ros.names import inside, space
@@ -28,6 +29,9 @@ deadline [s], because such a run must not depend on the wall clock."""
 LOCKSTEP: dict[str, dict[str, Any]] = {"bridge": {"lockstep_warning": 60.0}}
 """Defaults for lockstep, for settings that the scenario does not give. All nodes are in one
 process, so a late answer [s] only means that the machine is busy."""
+
+OUTLINE_ESTIMATOR = "outline_estimator"
+"""The kind of the node that estimates outlines."""
 
 GROUP_MOST = 5
 """Maximum number of robots in a group."""
@@ -89,9 +93,28 @@ def single(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
     return tuple(nodes)
 
 
-def _estimates(scenario: Scenario) -> bool:
-    """Whether the scenario asks for estimators."""
-    return bool(scenario.parameters.get("estimator", {}).get("enabled", False))
+def _estimates(scenario: Scenario, kind: str = "estimator") -> bool:
+    """Whether the scenario asks for estimators of a kind."""
+    return bool(scenario.parameters.get(kind, {}).get("enabled", False))
+
+
+def estimated(system: str, scenario: Scenario) -> Scenario:
+    """A scenario whose estimators are switched on: that of the outline for teams of several robots,
+    else that of contact friction, centre of mass and latency.
+
+    Raises
+    ------
+    SettingsError: the system has no estimator for this scenario.
+    """
+    several = any(len(t.robots) > 1 for t in teams_of(scenario))
+    kind = OUTLINE_ESTIMATOR if several else "estimator"
+    asked = scenario.settings(kind, enabled=True)
+    if not any(n.kind == kind for n in nodes_of(system, asked)):
+        raise SettingsError(
+            f"the system '{system}' has no estimator for scenario '{scenario.name}'; there is one "
+            "for a robot that pushes alone, and one for several robots with ring bumpers"
+        )
+    return asked
 
 
 def _estimator(place: str, world: str, team: Team) -> NodeSpec:
@@ -153,19 +176,26 @@ def method(name: str, scenario: Scenario, namespace: str = "") -> tuple[NodeSpec
         except SettingsError as error:
             raise SettingsError(f"{whose} {error}") from None
         place, prefix = team_space(namespace, team.name), f"{team.name}/" if team.name else ""
-        nodes.append(
-            NodeSpec(
-                f"{prefix}{spec.name}",
-                name,
-                place,
-                world,
-                robots=team.robots,
-                item=team.object,
-                team=team.name,
-            )
+        host = NodeSpec(
+            f"{prefix}{spec.name}",
+            name,
+            place,
+            world,
+            robots=team.robots,
+            item=team.object,
+            team=team.name,
         )
+        nodes.append(host)
         if _estimates(scenario) and len(team.robots) == 1:
             nodes.append(_estimator(place, world, team))
+        if _estimates(scenario, OUTLINE_ESTIMATOR):
+            if not all(isinstance(r.bumper, RingBumper) for r in robots.values()):
+                raise SettingsError(
+                    f"{whose} has robots without a ring bumper, which estimate no outline; leave "
+                    f"'{OUTLINE_ESTIMATOR}.enabled' unset"
+                )
+            beside = f"{prefix}{OUTLINE_ESTIMATOR}"
+            nodes.append(replace(host, name=beside, kind=OUTLINE_ESTIMATOR))
     return tuple(nodes)
 
 

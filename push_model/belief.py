@@ -96,6 +96,9 @@ class Belief:
     robots: Mapping[str, RobotSpec] = field(default_factory=dict)
     values: Mapping[tuple[str, str], Interval] = field(default_factory=dict)
     outlines: Mapping[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)
+    _made: dict[str, ObjectSpec] = field(
+        default_factory=dict, init=False, compare=False, repr=False
+    )
 
     def interval(self, body: str, quantity: str) -> Interval:
         """What is believed of a quantity; the files' value as an exact one where nobody says more.
@@ -121,6 +124,11 @@ class Belief:
         """
         if name not in self.objects:
             raise _unknown("object", name, self.objects)
+        if name not in self._made:  # it is asked for at every step
+            self._made[name] = self._object(name)
+        return self._made[name]
+
+    def _object(self, name: str) -> ObjectSpec:
         spec, found = self.objects[name], self._of(name)
         changes: dict[str, Any] = {
             k: found[k].value for k in ("mass", "floor_friction", "contact_friction") if k in found
@@ -129,7 +137,7 @@ class Belief:
             x, y = (self.interval(name, k).value for k in ("com_x", "com_y"))
             changes["com"] = (x, y)
         if name in self.outlines:
-            changes["shape"] = PolygonShape(vertices=self.outlines[name])
+            changes["shape"] = PolygonShape(vertices=self.outlines[name], frame="given")
         return replace(spec, **changes) if changes else spec
 
     def robot(self, name: str) -> RobotSpec:

@@ -27,11 +27,17 @@ class RectangleShape:
 
 @settings
 class PolygonShape:
-    """A simple polygon, convex or not; its frame is moved to the centroid of its area."""
+    """A simple polygon, convex or not."""
 
     kind: Literal["polygon"] = field(default="polygon", kw_only=True)
     vertices: tuple[tuple[float, float], ...] = bounded(
         low=-100.0, high=100.0, doc="Corners in order, clockwise or counter-clockwise (m)"
+    )
+    frame: Literal["centroid", "given"] = bounded(
+        "centroid",
+        doc="Frame of the object, in which motion capture gives its pose: 'centroid' has its "
+        "origin in the centroid of the area, wherever the corners have theirs; 'given' is the "
+        "frame of the corners",
     )
 
     def __post_init__(self) -> None:
@@ -39,7 +45,7 @@ class PolygonShape:
 
     def shape(self) -> Shape:
         """The shape."""
-        return polygon(np.array(self.vertices))
+        return polygon(np.array(self.vertices), moved=self.frame == "centroid")
 
 
 @settings

@@ -136,8 +136,11 @@ def densified(outline: Array, spacing: float) -> Array:
     return np.vstack(points)
 
 
-def polygon(vertices: Array, kind: str = "polygon") -> Shape:
-    """A polygon from its vertices ``(n, 2)`` [m], either orientation, origin anywhere.
+def polygon(vertices: Array, kind: str = "polygon", moved: bool = True) -> Shape:
+    """A polygon from its vertices ``(n, 2)`` [m], either orientation.
+
+    moved: whether the origin is moved to the centroid of the area. If not, the centre of mass is
+    taken to be at the origin of the vertices.
 
     Raises
     ------
@@ -158,7 +161,7 @@ def polygon(vertices: Array, kind: str = "polygon") -> Shape:
         points = points[::-1].copy()
     if kind == "polygon" and _crosses_itself(points):
         raise SettingsError("a polygon's sides must not cross each other")
-    outline = points - _centroid(points)
+    outline = points - _centroid(points) if moved else points
     return Shape(kind, outline, _sides(outline))
 
 

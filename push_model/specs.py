@@ -187,7 +187,7 @@ class ObjectSpec:
         shape = self.shape.shape()
         return shape if self.com == (0.0, 0.0) else shape.about(self.com)
 
-    @property
+    @cached_property
     def outline(self) -> Array:
         """``(n, 2)`` [m] in the geometric frame."""
         return self.shape.shape().outline

@@ -8,7 +8,6 @@ import math
 import sys
 from typing import Any
 
-from geometry_msgs.msg import TwistStamped
 from rclpy.node import Node
 
 from push_estimation.pose_gate import PoseGateSettings, Stamp
@@ -18,14 +17,13 @@ from push_estimation.stream_latency import LatencySettings
 from push_model.belief import POSES, Interval
 from push_model.settings import bounded, settings
 from push_msgs.msg import Belief as BeliefMessage
-from push_msgs.msg import Velocities
-from push_ros.conversions import time_from_ros
+from push_ros.command_feed import CommandFeed, Heard
 from push_ros.diagnostics import Diagnostics
 from push_ros.names import names_of
 from push_ros.parameters import declare_settings
 from push_ros.pose_feed import Frame, PoseFeed
 from push_ros.process import run_node
-from push_ros.qos import BELIEF, COMMAND
+from push_ros.qos import BELIEF
 from push_ros.report_conversions import belief_to_ros
 from push_scenario.scenario import Scenario, load_scenario
 
@@ -91,27 +89,13 @@ class EstimatorNode(Node):
         self._beliefs = self.create_publisher(
             BeliefMessage, topic, BELIEF, event_callbacks=self._diagnostics.publisher_events(topic)
         )
-        for kind, topic, handler in (
-            (TwistStamped, names.robot(self.robot, "cmd_vel"), self._on_twist),
-            (Velocities, names.world("cmd_vels"), self._on_velocities),
-        ):
-            events = self._diagnostics.subscription_events(topic)
-            self.create_subscription(kind, topic, handler, COMMAND, event_callbacks=events)
+        CommandFeed(self, names, [self.robot], self._diagnostics, self._on_command)
         bodies = [self.robot, self.object]
         self._poses = PoseFeed(self, names, gate, bodies, self._diagnostics, self._on_frame)
 
-    def _on_twist(self, message: TwistStamped) -> None:
-        twist = message.twist
-        stamp = time_from_ros(message.header.stamp)
-        self.estimates.command(stamp, float(twist.linear.x), float(twist.angular.z))
-
-    def _on_velocities(self, message: Velocities) -> None:
-        names = list(message.names)
-        if self.robot not in names:
-            return
-        at = names.index(self.robot)
-        v, omega = (float(c[at]) if at < len(c) else 0.0 for c in (message.vx, message.omega))
-        self.estimates.command(time_from_ros(message.header.stamp), v, omega)
+    def _on_command(self, heard: Heard) -> None:
+        if heard.robot == self.robot:
+            self.estimates.command(heard.stamp, heard.vx, heard.omega)
 
     def _on_frame(self, frame: Frame) -> None:
         if frame.verdict is Stamp.REFUSED:

@@ -77,3 +77,11 @@ def cross_validated(features: Array, target: Array, seed: int = 1) -> Correlatio
 def sign_test(lower: int, count: int) -> float:
     """Two-sided p-value of one thing being lower than another in so many of ``count`` pairs."""
     return float(binomtest(lower, count).pvalue) if count else 1.0
+
+
+def wilson(hits: int, count: int) -> tuple[float, float]:
+    """95 % interval of a probability by so many hits in ``count`` trials (Wilson 1927)."""
+    if not count:
+        return 0.0, 1.0
+    interval = binomtest(hits, count).proportion_ci(method="wilson")
+    return float(interval.low), float(interval.high)

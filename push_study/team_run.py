@@ -18,12 +18,12 @@ from push_model.arrays import Array
 from push_model.jobs import GoalRefused, JobError
 from push_model.settings import SettingsError
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
-from push_msgs.msg import Contacts, Poses, Report
+from push_msgs.msg import Belief, Contacts, Poses, Report
 from push_ros.claims import own_domain
 from push_ros.conversions import poses_from_ros, time_from_ros
 from push_ros.method_node import MethodNode
 from push_ros.names import Names
-from push_ros.qos import STATUS, STREAM
+from push_ros.qos import BELIEF, STATUS, STREAM
 from push_scenario.scenario import Scenario
 from push_study.graph_run import LockstepRun
 from push_study.pool import Row
@@ -69,7 +69,8 @@ class TeamTrace:
     ways ``(t, 1 + n, 3)``: poses of object and robots, every ``TRACE`` seconds; phases: [s] of each
     phase that the method reported; figures: values of its figures by name, at every report; forces
     ``(n, 2)`` [N] of the robots on the object, mean of each tick that ends at force_times [s];
-    collision_ticks: ticks in which robots touched each other, or anything a wall.
+    collision_ticks: ticks in which robots touched each other, or anything a wall. outlines: of the
+    object as estimators published them, ``(k, 2)`` [m], each with the time [s] of its poses.
     """
 
     times: list[float] = field(default_factory=list)
@@ -79,6 +80,7 @@ class TeamTrace:
     force_times: list[float] = field(default_factory=list)
     forces: list[Array] = field(default_factory=list)
     collision_ticks: int = 0
+    outlines: list[tuple[float, Array]] = field(default_factory=list)
     now: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
 
@@ -101,6 +103,8 @@ class Outcome:
     drawn: Row
     pushes: int = 0
     replans: int = 0
+    times: tuple[float, ...] = ()
+    """[s] that each target took that was reached, without planning."""
 
     @property
     def success(self) -> bool:
@@ -147,6 +151,7 @@ class TeamObserver(Node):
         self.create_subscription(Poses, names.world("ground_truth/poses"), self._on_truth, STREAM)
         self.create_subscription(Contacts, names.world("contacts"), self._on_contacts, STREAM)
         self.create_subscription(Report, names.team("report"), self._on_report, STATUS)
+        self.create_subscription(Belief, names.world("belief"), self._on_belief, BELIEF)
 
     def _on_truth(self, message: Poses) -> None:
         poses, _ = poses_from_ros(message, self._names)
@@ -179,6 +184,11 @@ class TeamObserver(Node):
         self.trace.force_times.append(time_from_ros(message.header.stamp))
         self.trace.forces.append(forces)
         self.trace.collision_ticks += hit
+
+    def _on_belief(self, message: Belief) -> None:
+        for outline in message.outlines:
+            table = np.column_stack([outline.x, outline.y])
+            self.trace.outlines.append((time_from_ros(message.header.stamp), table))
 
     def _on_report(self, message: Report) -> None:
         time = time_from_ros(message.header.stamp)
@@ -292,6 +302,7 @@ def _run(
             drawn,
             status.pushes,
             status.replans,
+            tuple(status.times),
         )
 
 

@@ -159,22 +159,27 @@ class CrescentLaw:
     ) -> None:
         """region: ``(m, 2)`` [m] corners of the convex one in which centres of robots may be;
         walls: what stands in it."""
-        self.settings = s = settings or CrescentLawSettings()
-        self._coverage, self._item, self._walls = Coverage(region), item, walls
+        self.settings = settings or CrescentLawSettings()
+        self._coverage, self._walls = Coverage(region), walls
         self._radius, self._speed = radius, speed
-        outline = item.geometry.outline
+        self._pushing = False
+        self._hold_since = self._settled = math.inf  # [s] of time
+        self._begun_with = 1.0
+        self._to_go = 0.0  # [m] of all ways of robots
+        self.believe(item)
+
+    def believe(self, item: ObjectSpec) -> None:
+        """See SwarmLaw."""
+        s, radius, outline = self.settings, self._radius, item.geometry.outline
+        self._item = item
         self._rim = Rim(outline, radius, 1.5 * radius)
         self._fine = Rim(outline, radius, 0.01)
         self._round = WayRound(outline, radius, s.clearance, s.slide)
         self._lever = float(np.hypot(*self._fine.points.T).max())
         self._surface = item.limit_surface()
-        self._pushing = False
-        self._hold_since = self._settled = math.inf  # [s] of time
-        self._begun_with = 1.0
-        self._to_go = 0.0  # [m] of all ways of robots
         self._escape: Escape | None = None
-        if walls is not None:
-            self._escape = Escape(self._rim, item, radius, walls, s.stuck, s.budge)
+        if self._walls is not None:
+            self._escape = Escape(self._rim, item, radius, self._walls, s.stuck, s.budge)
 
     def reset(self) -> None:
         """See SwarmLaw."""

@@ -9,6 +9,7 @@ from enum import Enum
 from typing import Protocol
 
 from push_model.arrays import Array
+from push_model.specs import ObjectSpec
 from swarm_push.density import Density
 
 
@@ -63,4 +64,8 @@ class SwarmLaw(Protocol):
 
     def reset(self) -> None:
         """Forget what was."""
+        ...
+
+    def believe(self, item: ObjectSpec) -> None:
+        """Go on with what is believed of the object now, in the phase that is under way."""
         ...

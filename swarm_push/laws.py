@@ -44,6 +44,5 @@ def make_law(
     region ``(m, 2)`` [m] of their centres; walls: what stands in it, of which the printed law knows
     nothing."""
     if sections.law.law == "thesis":
-        around = float((item.geometry.outline**2).sum(axis=1).max() ** 0.5)
-        return ThesisLaw(region, around, sections.thesis)
+        return ThesisLaw(region, item, sections.thesis)
     return CrescentLaw(region, item, radius, speed, sections.crescent, walls)

@@ -95,11 +95,9 @@ class ObjectTrack:
     ) -> None:
         """outline: ``(k, 2)`` [m] about the centre of mass."""
         warm_up()
-        self.settings = settings
-        space = FreeSpace(grid)
-        self.field = space.field
-        self._finder, self._diameter = WayFinder(space, outline, 0.0), 2.0 * radius
-        self._lever = float(np.hypot(*outline.T).max())
+        self.settings, self._space, self._diameter = settings, FreeSpace(grid), 2.0 * radius
+        self.field = self._space.field
+        self.believe(outline)
         self._target = np.zeros(3)
         self._pieces: list[tuple[Array, Array]] = []
         self._part = 0.0
@@ -109,6 +107,11 @@ class ObjectTrack:
         self._planned = -math.inf  # [s] when a way was looked for last
         self._others = 0  # that the way leads round, or through if it must
         self._through = self._astray = False
+
+    def believe(self, outline: Array) -> None:
+        """Search further ways for another outline ``(k, 2)`` [m] about the centre of mass."""
+        self._finder = WayFinder(self._space, outline, 0.0)
+        self._lever = float(np.hypot(*outline.T).max())
 
     @property
     def under_way(self) -> bool:

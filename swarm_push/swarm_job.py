@@ -5,7 +5,6 @@ Robots may come, leave and die meanwhile: whoever is seen and does as it is told
 
 import math
 from collections.abc import Generator, Mapping, Sequence
-from functools import partial
 
 import numpy as np
 
@@ -67,15 +66,7 @@ class SwarmJob:
             self._walls = None if walls.open else walls
             track = track or TrackSettings()
             self.track = ObjectTrack(walls.space.field, item.geometry.outline, self._radius, track)
-        self._make_law = partial(
-            make_law,
-            laws or LawSections(),
-            region,
-            radius=self._radius,
-            speed=self._speed,
-            walls=walls,
-        )
-        self._law = self._make_law(item)
+        self._law = make_law(laws or LawSections(), region, item, self._radius, self._speed, walls)
         self._outline = item.geometry.outline
         self._lever = float(np.hypot(*self._outline.T).max())
         self.state, self.reason, self.error = JobPhase.IDLE, "waiting for a goal", JobError.NONE
@@ -181,16 +172,15 @@ class SwarmJob:
         self._liveness.revive()
 
     def believe(self, item: ObjectSpec) -> None:
-        """Go on with another object than before: the law and what its robots can push are made anew
-        for it, and the way where its outline is another one."""
+        """Go on with what is believed of the object now. A way of the object that is under way is
+        kept; the next one is searched for the new outline."""
         outline = item.geometry.outline
         if not np.array_equal(outline, self._outline):
             self._outline = outline
             self._lever = float(np.hypot(*outline.T).max())
             if self.track is not None:
-                track = self.track
-                self.track = ObjectTrack(track.field, outline, self._radius, track.settings)
-        self._law = self._make_law(item)
+                self.track.believe(outline)
+        self._law.believe(item)
         self._feasibility = Feasibility(item, self._robot, self._grid, self.track)
         self._strengths.clear()
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from push_model.arrays import Array
 from push_model.settings import bounded, settings
+from push_model.specs import ObjectSpec
 from swarm_push.coverage import Coverage
 from swarm_push.density import tangential
 from swarm_push.law import Scene, SwarmPhase, SwarmStep
@@ -52,11 +53,15 @@ def printed_sigmas(count: int) -> tuple[float, float]:
 
 
 class ThesisLaw:
-    """(4.1)-(4.8) with the errata; all that it knows of the object is a radius [m]."""
+    """(4.1)-(4.8) with the errata; all that it knows of the object is its radius."""
 
-    def __init__(self, region: Array, radius: float, settings: ThesisLawSettings) -> None:
-        self.settings = settings
-        self._coverage, self._radius = Coverage(region), radius
+    def __init__(self, region: Array, item: ObjectSpec, settings: ThesisLawSettings) -> None:
+        self.settings, self._coverage = settings, Coverage(region)
+        self.believe(item)
+
+    def believe(self, item: ObjectSpec) -> None:
+        """See SwarmLaw."""
+        self._radius = item.geometry.circumradius
 
     def reset(self) -> None:
         """See SwarmLaw; nothing is remembered."""

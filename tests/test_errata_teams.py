@@ -251,7 +251,7 @@ def test_4_4_the_lead_does_not_depend_on_the_rate_of_control():
     for name in ("lead", "dt"):
         for rate in (25.0, 50.0):
             lead = {"lead": ThesisLawSettings().lead, "dt": 1.0 / rate}[name]
-            law = ThesisLaw(ROOM, 0.25, ThesisLawSettings(lead=lead))
+            law = ThesisLaw(ROOM, load_object("swarm_square"), ThesisLawSettings(lead=lead))
             robots = start.copy()
             for k in range(int(2.0 * rate)):
                 scene = Scene(

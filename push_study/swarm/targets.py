@@ -4,12 +4,14 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 
 from push_job.method import Task
 from push_model import se2
+from push_model.arrays import Array
 from push_model.specs import EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
 from push_scenario.scenario import Scenario
@@ -50,8 +52,14 @@ class SwarmTask:
 
 def length(targets: Sequence[tuple[float, float]]) -> float:
     """[m] straight from target to target, from the origin on."""
+    return float(legs(targets).sum())
+
+
+def legs(targets: Sequence[tuple[float, float]]) -> Array:
+    """``(n,)`` [m] to each target straight from the one before."""
     points = np.array([(0.0, 0.0), *targets])
-    return float(np.hypot(*np.diff(points, axis=0).T).sum())
+    lengths: Array = np.hypot(*np.diff(points, axis=0).T)
+    return lengths
 
 
 def positions(targets: Sequence[tuple[float, float]]) -> Task:
@@ -96,13 +104,20 @@ def run(task: SwarmTask, mistake: Callable[[Scenario], Scenario] | None = None) 
     }
     if outcome.success:
         row["lambda"] = outcome.charged * robot.max_speed / length(task.targets)
+    times = outcome.times[: outcome.reached]
+    each = np.array(times) * robot.max_speed / legs(task.targets)[: len(times)]
+    row |= {f"lambda_{k + 1}": float(value) for k, value in enumerate(each)}
     return row | phase_times(outcome)
 
 
 def keep_ways(path: Path, outcome: Outcome) -> None:
-    """Write the ways of a run for its pictures."""
+    """Write the ways of a run, and the outlines that were estimated in it, for its pictures."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    np.savez_compressed(path, ways=np.array(outcome.trace.ways))
+    found = outcome.trace.outlines
+    arrays: dict[str, Any] = {"ways": np.array(outcome.trace.ways)}
+    arrays["outline_times"] = np.array([time for time, _ in found])
+    arrays |= {f"outline_{k}": outline for k, (_, outline) in enumerate(found)}
+    np.savez_compressed(path, **arrays)
 
 
 def phase_times(outcome: Outcome) -> Row:

@@ -48,6 +48,18 @@ def test_an_outline_replaces_the_shape():
             FILES.updated({}, {"box": wrong})
 
 
+def test_an_outline_stays_where_it_is_in_the_frame_of_the_object():
+    """Motion capture gives poses of that frame, wherever the centroid of the outline is."""
+    random = np.random.default_rng(1)
+    angle = np.arange(7) * 2.0 * np.pi / 7
+    for _ in range(50):
+        radius = random.uniform(0.05, 0.2, (7, 1))
+        outline = radius * np.column_stack([np.cos(angle), np.sin(angle)])
+        told = FILES.updated({}, {"box": outline}).object("box")
+        assert np.array_equal(told.outline, outline)
+        assert told.mass_pose(np.array([1.0, 2.0, 0.5])) == pytest.approx([1.0, 2.0, 0.5])
+
+
 @pytest.mark.parametrize(
     ("body", "quantity", "ends", "why"),
     [

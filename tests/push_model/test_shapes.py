@@ -6,6 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from push_model import SettingsError, ellipse, flower, polygon, rectangle, shape_from_mapping
+from push_model.shape_specs import PolygonShape
 
 
 def test_rectangle_against_textbook():
@@ -106,3 +107,14 @@ def test_sides_on_one_line_do_not_cross():
     assert polygon(np.array(u)).area == pytest.approx(5.0)
     moved = polygon(np.array(u)).about((0.1, -0.2))
     assert moved.sides[0].distance == pytest.approx(polygon(np.array(u)).sides[0].distance - 0.2)
+
+
+def test_a_polygon_keeps_the_frame_of_its_corners_where_that_is_asked_for():
+    corners = np.array([[0.0, 0.0], [0.2, 0.0], [0.2, 0.1], [0.0, 0.1]])
+    assert polygon(corners, moved=False).outline == pytest.approx(corners)
+    assert polygon(corners[::-1], moved=False).outline == pytest.approx(corners)
+    assert polygon(corners).outline == pytest.approx(corners - [0.1, 0.05])
+    vertices = tuple(map(tuple, corners.tolist()))
+    assert PolygonShape(vertices, frame="given").shape().outline == pytest.approx(corners)
+    with pytest.raises(SettingsError, match="frame"):
+        PolygonShape(vertices, frame="corner")

@@ -193,8 +193,8 @@ def test_lambda_of_every_swarm_study_is_in_its_aggregate(name):
     for k in range(4):
         ratios = dict.fromkeys(("dead_over_alive", "moved_over_direct", "with_the_arc"), 1.0 + k)
         row = {"scenario": "s", "robots": 8, "law": "crescent", "method": "m", "seed": k}
-        row |= {"item": "i", "turned": True, "believed": "exact", "success": k < 3}
-        row["lambda"] = 1.0 + k
+        row |= {"item": "i", "turned": True, "believed": "exact", "arm": "told"}
+        row |= {"lambda": 1.0 + k, "success": k < 3}
         rows.append(row | {"charged_s": 10.0, "delta_s": 1.0} | ratios)
     found = aggregate(rows, statistics_of(what, rows))
     if name == "swarm-upsets":

@@ -27,16 +27,28 @@ def test_only_the_outline_is_mistaken(name):
 def test_every_belief_is_a_task_with_a_trace_of_its_own(tmp_path):
     options = StudyOptions(swarm_outline.SCENARIOS, 2, 1, tmp_path)
     tasks = swarm_outline.tasks(options)
-    assert len(tasks) == 2 * len(swarm_outline.BELIEVED) * len(swarm_outline.SCENARIOS)
+    cells = len(swarm_outline.BELIEVED) * len(swarm_outline.ARMS) * len(swarm_outline.SCENARIOS)
+    assert len(tasks) == 2 * cells
     assert len({t.trace for t in tasks}) == len(tasks)
 
 
 @pytest.mark.long
-def test_a_wrong_outline_costs_time_and_the_world_keeps_the_right_one(tmp_path):
-    """One target, a metre and a half away."""
+def test_with_a_radius_only_the_estimator_saves_most_of_the_time(tmp_path):
+    """One target, a metre and a half away. The world has the right outline."""
     options = StudyOptions(("swarm_square",), 1, 1, tmp_path)
-    tasks = {t.believed: replace(t, targets=((1.0, 1.0),)) for t in swarm_outline.tasks(options)}
-    exact, large = (swarm_outline.trial(tasks[b]) for b in ("exact", "+10 %"))
+    tasks = {
+        (t.believed, t.arm): replace(t, targets=((1.0, 1.0),)) for t in swarm_outline.tasks(options)
+    }
+    exact, told, estimated = (
+        swarm_outline.trial(tasks[cell])
+        for cell in (("exact", "told"), ("disc", "told"), ("disc", "estimated"))
+    )
     assert exact["success"] and exact["targets"] == 1
-    assert exact["object_floor_friction"] == large["object_floor_friction"]
-    assert not large["success"] or large["lambda"] > exact["lambda"]
+    assert exact["object_floor_friction"] == estimated["object_floor_friction"]
+    assert estimated["success"] and exact["lambda_1"] < estimated["lambda_1"] < 3.0
+    assert told["lambda_1"] > 3.0 * estimated["lambda_1"]
+    found = swarm_outline.statistics([exact, told, estimated])
+    assert found["disc, estimated"]["targets"] == 1 and found["disc, estimated"]["of"] == 6
+    assert found["disc, told"]["lambda_1"] == told["lambda_1"]
+    low, high = found["disc, estimated"]["wilson"]
+    assert 0.0 < low < 1 / 6 < high < 0.6
