@@ -108,7 +108,7 @@ class Uncertainty:
         if self.outline > 0.0:
             out = float(random.uniform(-self.outline, self.outline))
             corners = tuple((float(x), float(y)) for x, y in inset(item.outline, -out))
-            changed = replace(changed, shape=PolygonShape(vertices=corners))
+            changed = replace(changed, shape=PolygonShape(vertices=corners, frame="given"))
             drawn[f"{name}_outline_m"] = out
         return changed
 

@@ -110,8 +110,16 @@ class ObjectTrack:
 
     def believe(self, outline: Array) -> None:
         """Search further ways for another outline ``(k, 2)`` [m] about the centre of mass."""
-        self._finder = WayFinder(self._space, outline, 0.0)
+        self._outline = outline
+        self._latest: WayFinder | None = None
         self._lever = float(np.hypot(*outline.T).max())
+
+    @property
+    def _finder(self) -> WayFinder:
+        """Made when it is first needed: that takes about 10 ms."""
+        if self._latest is None:
+            self._latest = WayFinder(self._space, self._outline, 0.0)
+        return self._latest
 
     @property
     def under_way(self) -> bool:

@@ -1,5 +1,7 @@
 """The rim of an object: the line on which the centres of round robots in contact with it lie."""
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,10 +28,7 @@ class Rim:
     def __init__(self, outline: Array, radius: float, spacing: float) -> None:
         """outline: ``(k, 2)`` [m] of the object about its centre of mass. radius: [m] of the
         robots. spacing: [m] between points, at most."""
-        hull = convex_hull(outline)
-        line = _support_line(hull, radius)
-        if _area(outline) < (1.0 - _FLAT) * _area(hull):
-            line = _line_with_notches(outline, radius)
+        line = _line_of_contact(np.ascontiguousarray(outline).tobytes(), radius)
         ring = np.vstack([line, line[:1]])
         way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(ring, axis=0).T))])
         self.length = float(way[-1])
@@ -68,6 +67,16 @@ class Rim:
             return approach
         both: Array = np.maximum(approach, 0.0) + slip
         return both
+
+
+@lru_cache(maxsize=4)
+def _line_of_contact(outline: bytes, radius: float) -> Array:
+    """Of an outline ``(k, 2)`` float64. Several rims of one object differ in their spacing only."""
+    corners = np.frombuffer(outline).reshape(-1, 2)
+    hull = convex_hull(corners)
+    if _area(corners) < (1.0 - _FLAT) * _area(hull):
+        return _line_with_notches(corners, radius)
+    return _support_line(hull, radius)
 
 
 def _support_line(hull: Array, radius: float) -> Array:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from push_model.settings import SettingsError
+from push_scenario.bodies import load_object
 from push_scenario.scenario import load_scenario
 from push_study.uncertainty import UNCERTAINTIES, uncertainty
 
@@ -49,6 +50,19 @@ def test_unknown_draws_the_outline_too_and_only_the_estimator_may_find_it_out():
         assert np.abs(real).max() == pytest.approx(0.045 + row["box_outline_m"], abs=1e-6)
         assert believed.parameters["estimator"]["enabled"] is True
         assert believed.parameters["bridge"]["motion_capture"]["dropout"] == 0.01
+
+
+@pytest.mark.parametrize("name", ["transport_l", "plate_triangle", "swarm_rectangle"])
+def test_every_side_lies_as_far_out_as_was_drawn_in_the_frame_that_motion_capture_sees(name):
+    item = load_object(name)
+    for seed in range(50):
+        row = {}
+        level = uncertainty("unknown")
+        real = level.draw_item("box", item, np.random.default_rng(seed), row)
+        edges = np.roll(item.outline, -1, axis=0) - item.outline
+        outward = np.column_stack([edges[:, 1], -edges[:, 0]]) / np.hypot(*edges.T)[:, None]
+        moved = ((real.outline - item.outline) * outward).sum(axis=1)
+        assert moved == pytest.approx(row["box_outline_m"], abs=1e-9)
 
 
 def test_own_draws_for_each_scenario_only_where_they_are_hard():
