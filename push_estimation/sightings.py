@@ -54,11 +54,11 @@ class Sightings:
         return np.array([c.mean for c in self._contacts.values()]).reshape(-1, 2)
 
     def been(self, points: Array) -> None:
-        """Robots were at ``(n, 2)`` [m]; those outside of the rectangle do not count."""
-        for point in points[((points > self._low) & (points < self._high)).all(axis=1)]:
-            at = tuple(((point - self._low) / _CELL).astype(np.intp))
-            self._count[at] = min(self._count[at] + 1.0, _COUNTED)
-            self._mean[at] += (point - self._mean[at]) / self._count[at]
+        """Robots were at ``(n, 2)`` [m], one a cell; outside of the rectangle they do not count."""
+        inside = points[((points > self._low) & (points < self._high)).all(axis=1)]
+        at = tuple(((inside - self._low) / _CELL).astype(np.intp).T)
+        self._count[at] = np.minimum(self._count[at] + 1.0, _COUNTED)
+        self._mean[at] += (inside - self._mean[at]) / self._count[at][:, None]
 
     @property
     def blocked(self) -> Array:
