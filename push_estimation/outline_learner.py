@@ -33,8 +33,9 @@ class OutlineLearner:
         self._stopped.command(name, vx, vy, world)
 
     def interrupted(self) -> None:
-        """The stream of poses was interrupted; what was learned stays."""
+        """The stream of poses was interrupted, or its clock was reset; what was learned stays."""
         self._stopped.reset()
+        self._next = -math.inf
 
     def frame(
         self,

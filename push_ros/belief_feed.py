@@ -59,10 +59,11 @@ class BeliefFeed:
         except InvalidMessage as error:
             self._diagnostics.refuse(self._topic, str(error))
             return
-        self._said = said
+        first, self._said = message.source not in self._said, said
         if belief == self.current:
             return
         self.current = belief
-        self._node.get_logger().info(f"the belief of '{message.source}' is used from now on")
+        if first:  # an estimator speaks every second
+            self._node.get_logger().info(f"the belief of '{message.source}' is used from now on")
         if self._changed is not None:
             self._changed(belief)

@@ -5,6 +5,7 @@ import pytest
 from shapely import LinearRing, MultiPoint, Point, Polygon
 
 from push_estimation.outline_estimate import OutlineEstimate
+from push_estimation.outline_learner import OutlineLearner
 
 R = 0.037  # [m]
 NOISE = 1e-3  # [m] of one frame
@@ -157,3 +158,18 @@ def test_without_sightings_it_is_the_first_outline():
     assert estimate.fit()
     assert np.array_equal(estimate.outline, outline)
     assert estimate.explored() == 0.0
+
+
+def test_after_the_clock_was_reset_estimates_go_on():
+    """Stamps begin at 0 again."""
+    outline = random_outline(np.random.default_rng(1), notched=False)
+    learner = OutlineLearner(outline, R, 1.0)
+    robots = {"a": np.array([0.4, 0.0, 0.0])}
+
+    def estimates(stamps):
+        return [learner.frame(t, np.zeros(3), robots, np.zeros((0, 2))) for t in stamps]
+
+    assert sum(estimates(np.arange(100.0, 103.0, 0.02))) == 3
+    assert not any(estimates(np.arange(0.0, 3.0, 0.02)))
+    learner.interrupted()
+    assert sum(estimates(np.arange(0.0, 3.0, 0.02))) == 3
