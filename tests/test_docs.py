@@ -23,6 +23,8 @@ from push_mpc.torque_tracker import TorqueTrackerSettings
 from push_mpc.wheel_slip_nmpc import WheelSlipSettings
 from push_planner import PlanError, PlannerSettings
 from push_planner.robot_path import RobotPathError
+from push_scenario.bodies import load_object
+from push_scenario.scenario import load_scenario
 from push_study.study import experiment
 from push_supervisor import SupervisorSettings
 from swarm_push.agent import AgentSettings
@@ -156,6 +158,29 @@ def test_the_text_of_a_parameter_stands_alone(path):
             assert not re.search(r"likewise|meanwhile|^Of |^By |^At |^\(|that it |whoever", text), (
                 text
             )
+
+
+def test_each_file_of_the_how_to_is_named_and_valid(tmp_path):
+    """All blocks but commands start with the name of their file; the suite reads the YAML files."""
+    text = (ROOT / "docs/how-to.md").read_text()
+    blocks = re.findall(r"^```(\w+)\n(.*?)^```", text, re.M | re.S)
+    files = {}
+    for language, block in blocks:
+        assert language in ("sh", "yaml", "python"), language
+        if language != "sh":
+            name = re.match(r"# (my_\w+\.(?:yaml|py))\n", block)
+            assert name, block
+            assert name[1] not in files
+            files[name[1]] = tmp_path / name[1]
+            files[name[1]].write_text(block)
+    objects = [p for p in files.values() if "contact_friction" in p.read_text()]
+    assert len(objects) >= 2
+    for path in objects:
+        assert load_object(str(path)).contact_friction > 0
+    scenarios = [p for n, p in files.items() if n.endswith("scenario.yaml")]
+    assert len(scenarios) >= 3
+    for path in scenarios:
+        assert load_scenario(str(path)).goal is not None
 
 
 def words_of(line):
