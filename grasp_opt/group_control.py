@@ -44,32 +44,36 @@ class GroupControlSettings:
         40.0,
         low=0.0,
         high=1e4,
-        doc="Proportional gain K_P of (3.20): force per position error of the object (N/m).",
+        doc="Proportional gain K_P of (3.20) of the thesis: force per position error of the "
+        "object (N/m).",
     )
     orientation_gain: float = bounded(
         6.0,
         low=0.0,
         high=1e4,
-        doc="Proportional gain K_P of (3.20): torque per orientation error of the object (Nm/rad).",
+        doc="Proportional gain K_P of (3.20) of the thesis: torque per orientation error of "
+        "the object (Nm/rad).",
     )
     velocity_gain: float = bounded(
         2.0,
         low=0.0,
         high=1e4,
-        doc="Derivative gain K_D of (3.20): force per velocity error of the object (N s/m).",
+        doc="Derivative gain K_D of (3.20) of the thesis: force per velocity error of the "
+        "object (N s/m).",
     )
     turning_gain: float = bounded(
         0.1,
         low=0.0,
         high=1e4,
-        doc="Derivative gain K_D of (3.20): torque per turn rate error of the object (Nm s/rad).",
+        doc="Derivative gain K_D of (3.20) of the thesis: torque per turn rate error of the "
+        "object (Nm s/rad).",
     )
     place_gain: float = bounded(
         0.05,
         low=0.0,
         high=100.0,
-        doc="Gain K_PR of (3.25): speed of a robot along the outline per distance from its "
-        "place (1/s).",
+        doc="Gain K_PR of (3.25) of the thesis: speed of a robot along the outline per distance "
+        "from its place (1/s).",
     )
     gap_gain: float = bounded(
         2.0,
@@ -94,7 +98,7 @@ class GroupControlSettings:
         0.002,
         low=0.0,
         high=10.0,
-        doc="Gain K_VR of (3.25): robot speed per contact force (m/s/N).",
+        doc="Gain K_VR of (3.25) of the thesis: robot speed per contact force (m/s/N).",
     )
     correction: float = bounded(
         2.0,
@@ -181,7 +185,11 @@ def distribute(wrench: Array, contacts: Contacts, friction: float, length: float
 
 
 class GroupController:
-    """One group on one object, placed at ``ways (n,)`` [m] along its outline."""
+    """One group on one object, placed at ``ways (n,)`` [m] along its outline.
+
+    offsets: ``(n,)`` [m] gaps to the believed outline at which the robots touch the object; other
+    than 0 where the outline is not as believed.
+    """
 
     def __init__(
         self,
@@ -197,20 +205,29 @@ class GroupController:
         self.outline, self.friction, self.surface = outline, friction, surface
         self._radius, self.ways = radius, ways
         self.places = outline.at(ways).centres(radius)
+        self.offsets = np.zeros(len(ways))
 
-    def meet(self, pose: Array, ahead: Array, robots: Array) -> tuple[Array, Array]:
+    def closing(self, pose: Array, robots: Array, velocities: Array) -> tuple[Array, Array]:
+        """Gaps ``(n,)`` [m] of robots at ``(n, 2)`` to the believed outline of an object at a pose
+        ``(3,)``, and how fast [m/s] velocities ``(n, 2)`` of the robots close them."""
+        way, away = self.outline.nearest(se2.transform(se2.inverse(pose), robots))
+        normals = self.outline.at(way).normals @ se2.rotation_matrix(float(pose[2])).T
+        return away - self._radius, (velocities * normals).sum(axis=1)
+
+    def meet(self, pose: Array, ahead: Array, robots: Array) -> Array:
         """Velocities ``(n, 2)`` [m/s] by which robots come to an object at a pose ``(3,)`` along
-        unit directions ``ahead (n, 2)`` in its frame, and their gaps ``(n,)`` [m].
+        unit directions ``ahead (n, 2)`` in its frame.
 
         A robot that already goes the way that it will push does not have to turn at the object.
         """
         s = self.settings
         local = se2.transform(se2.inverse(pose), robots)
         way, away = self.outline.nearest(local)
-        gaps = away - self._radius
+        gaps = away - self._radius - self.offsets
         slant = np.maximum(0.3, (self.outline.at(way).normals * ahead).sum(axis=1))
         speed = np.clip(s.gap_gain * gaps / slant, -s.approach, s.approach)
-        return (speed[:, None] * ahead) @ se2.rotation_matrix(float(pose[2])).T, gaps
+        velocities: Array = (speed[:, None] * ahead) @ se2.rotation_matrix(float(pose[2])).T
+        return velocities
 
     def ahead(self, twist: Array) -> Array:
         """``(n, 2)`` unit directions of the robots at their places as the object begins to move
@@ -248,7 +265,7 @@ class GroupController:
         )
         local = se2.transform(se2.inverse(pose), robots)
         way, away = self.outline.nearest(local)
-        contacts, gaps = self.outline.at(way), away - self._radius
+        contacts, gaps = self.outline.at(way), away - self._radius - self.offsets
         touching = gaps < s.lost
         forces = np.zeros((len(robots), 2))
         if touching.any():

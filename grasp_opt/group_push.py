@@ -12,6 +12,7 @@ from enum import Enum
 import numpy as np
 
 from grasp_opt.contact_outline import ContactOutline
+from grasp_opt.contact_sense import ContactSense
 from grasp_opt.group_control import (
     GroupCommand,
     GroupController,
@@ -26,6 +27,7 @@ from push_model.arrays import Array
 from push_model.settings import bounded, settings
 from push_model.specs import ObjectSpec, RobotSpec
 
+_LISTEN = 0.3  # [s] over which gaps are averaged, against the noise of the poses
 _GAP = 0.2  # [s] between ticks from which on they are no longer one after the other
 
 
@@ -38,6 +40,13 @@ class GroupPushSettings:
         low=1e-5,
         high=0.1,
         doc="Gap between robot and object below which they count as in contact (m).",
+    )
+    outline_error: float = bounded(
+        0.01,
+        low=0.0,
+        high=0.1,
+        doc="Greatest error of the believed outline of the object (m). Within this distance from "
+        "it, a robot that comes no closer to the object although commanded to is in contact.",
     )
     steady: float = bounded(
         0.1,
@@ -165,6 +174,8 @@ class GroupPush:
         self._filter = VelocityFilter(
             s.position_noise, s.orientation_noise, s.acceleration, s.turning
         )
+        self._sense = ContactSense(len(ways))
+        self._closing = np.zeros(len(ways))
         self._prediction = GroupPrediction(len(ways), self.controller.settings.pose_delay)
         self._obedience = ActuationMonitor(len(ways), s.dead, s.dead_way)
         self._begin: float | None = None
@@ -176,14 +187,17 @@ class GroupPush:
     def believe(self, item: ObjectSpec, robot: RobotSpec) -> None:
         """Push on with what is believed of the object and the robots now."""
         self._drive = robot.differential
+        before = self.controller
         self.controller = GroupController(
             ContactOutline(item.geometry),
-            self.controller.ways,
+            before.ways,
             item.contact_friction,
             item.limit_surface(),
             robot.footprint_radius,
-            self.controller.settings,
+            before.settings,
         )
+        if np.array_equal(self.controller.outline.shape.outline, before.outline.shape.outline):
+            self.controller.offsets = before.offsets
 
     @property
     def pose_delay(self) -> float:
@@ -223,6 +237,7 @@ class GroupPush:
         tick, self._last = now - self._last, now
         if tick > _GAP:  # nobody saw anything for a while: what was known of motion is old
             self._filter.reset()
+            self._sense.reset()
             self._begin += tick
             self._moved_on += tick
             tick = 0.0
@@ -234,8 +249,10 @@ class GroupPush:
         ahead = self.time + tick
         command = None
         if searching:
-            velocities, gaps = self.controller.meet(estimate, self.ahead, robots[:, :2])
-            self._look_for_contact(now, gaps)
+            self._find_offsets(now, pose, seen)
+            velocities = self.controller.meet(estimate, self.ahead, robots[:, :2])
+            _, self._closing = self.controller.closing(pose, seen[:, :2], velocities)
+            self._look_for_contact(now)
         else:
             command = self.controller.command(
                 estimate,
@@ -255,7 +272,16 @@ class GroupPush:
             return GroupStep(Phase.DONE, 0.0 * twists, command, self.time)
         return GroupStep(Phase.SEARCH if searching else Phase.PUSH, twists, command, self.time)
 
-    def _look_for_contact(self, now: float, gaps: Array) -> None:
+    def _find_offsets(self, now: float, pose: Array, robots: Array) -> None:
+        """Which robots touch the object elsewhere than at its believed outline."""
+        gaps, _ = self.controller.closing(pose, robots[:, :2], np.zeros((len(robots), 2)))
+        touching, mean = self._sense.step(now, gaps, self._closing)
+        found = touching & (np.abs(mean) <= self.settings.outline_error)
+        found &= self.controller.offsets == 0.0
+        self.controller.offsets = np.where(found, mean, self.controller.offsets)
+
+    def _look_for_contact(self, now: float) -> None:
+        gaps = self._sense.recent(_LISTEN) - self.controller.offsets
         if (gaps > self.settings.contact).any():
             self._contact_since = None
         elif self._contact_since is None:
