@@ -1,6 +1,5 @@
 """The two layers together: from start and goal pose to a plan of pushes that keeps improving."""
 
-import time
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import replace
 
@@ -15,13 +14,13 @@ from push_model.specs import ObjectSpec, RobotSpec
 from push_model.stick_certificate import ContactBelief
 from push_planner.candidate_poses import along_guide, manoeuvres, nearby, runs, scattered
 from push_planner.cost_bound import CostBound
+from push_planner.gentle import gentler
 from push_planner.guide_path import GuidePath, NoGuidePath, guide_paths, origin_floor
 from push_planner.narrow_way import lined_up
-from push_planner.push_graph import PushGraph, PushStep, SearchStatistics
+from push_planner.push_graph import PushGraph, PushStep
 from push_planner.push_plan import (
     PlanError,
     PlanningFailed,
-    PlanStatistics,
     Progress,
     PushPlan,
 )
@@ -31,6 +30,7 @@ from push_planner.refusal import check_pose, check_room, check_way, sides_shut_o
 from push_planner.scene import PushScene
 from push_planner.settings import PlannerSettings
 from push_planner.thesis_search import ThesisSearch, poses_on
+from push_planner.work import Guides, Work
 
 _Ends = tuple[Array, Array]
 _WORTH = 0.002  # of the cost that a further plan must save
@@ -38,71 +38,6 @@ _NEARBY = 40  # poses about each one that an improvement moves
 _SIZES = 9  # rounds after which an improvement moves poses by the first size again
 _WAYPOINTS = 30  # at most, in the first attempt
 _REACH = (10.0, 3.0)  # waypoints that a push leads on at most: of the settings; of a long path
-
-
-class _Work:
-    """What has been spent on one plan, and what is left."""
-
-    def __init__(self, settings: PlannerSettings, seed: int, robot: Array | None) -> None:
-        self.seed, self.robot = seed, robot
-        self.random = np.random.default_rng(seed)
-        self.statistics = SearchStatistics()
-        self.iterations = self.poses = 0
-        self.least = 0.0  # [m] lower bound of the cost of a plan
-        self.ways_out = self.ways_in = False  # whether any push leaves the start, ends at the goal
-        self.left = settings.total_expansions
-        self._most = settings.max_expansions
-        self._clock = time.perf_counter()
-
-    def effort(self) -> int:
-        """Pushes that the next search may try."""
-        return min(self.left, self._most)
-
-    def counted(self, guide: GuidePath) -> PlanStatistics:
-        """The work until now."""
-        return PlanStatistics(
-            self.iterations,
-            self.statistics.expanded,
-            self.statistics.generated,
-            self.statistics.solved,
-            self.statistics.feasible,
-            guide.cost,
-            guide.length,
-            guide.clearance,
-            time.perf_counter() - self._clock,
-        )
-
-
-class _Guides:
-    """Guide paths, each made when it is first asked for."""
-
-    def __init__(self, source: Iterator[GuidePath], work: _Work, iterations: int) -> None:
-        self._source, self._work, self._iterations = source, work, iterations
-        self._found: list[GuidePath] = []
-
-    def _another(self) -> bool:
-        guide = next(self._source, None)
-        if guide is not None:
-            self._found.append(guide)
-            self._work.iterations += self._iterations
-        return guide is not None
-
-    def number(self, number: int) -> GuidePath:
-        """One after another, and again from the first."""
-        while len(self._found) <= number and self._another():
-            pass
-        if not self._found:
-            raise PlanningFailed(
-                PlanError.NO_GUIDE_PATH,
-                "no path was found along which the object fits; choose another goal",
-            )
-        return self._found[number % len(self._found)]
-
-    def all(self) -> list[GuidePath]:
-        """Those that there are."""
-        while self._another():
-            pass
-        return self._found
 
 
 class PushPlanner:
@@ -154,16 +89,17 @@ class PushPlanner:
         bound is raised by the work on two runs. robot: ``(3,)`` pose of the robot, from which it
         must have a way to the first side; None if unknown.
 
-        The last report carries the best plan, with the lower bound of all costs. A plan that is
-        reported never costs more than one before it. The work is counted, never timed, so that
-        equal inputs and seeds give equal plans.
+        The last report carries the final plan, with the lower bound of all costs. A plan that is
+        reported never costs more than one before it; only the final one may, by ``easing``.
+
+        The work is counted, never timed, so that equal inputs and seeds give equal plans.
 
         Raises
         ------
         PlanningFailed: when there is no plan; from the ``next`` that finds it out.
         """
         settings = self.settings
-        work = _Work(settings, settings.seed if seed is None else seed, robot)
+        work = Work(settings, settings.seed if seed is None else seed, robot)
         start = np.array([start[0], start[1], se2.wrap(start[2])])
         goal = np.array([goal[0], goal[1], se2.wrap(goal[2])])
         self.check(start, "start", PlanError.START_OCCUPIED)
@@ -173,7 +109,7 @@ class PushPlanner:
         check_way(self.scene, start, robot)
         ends = start, goal
         start, goal = (self.scene.item.mass_pose(pose) for pose in ends)
-        guides = _Guides(self._guides(start, goal, work.seed), work, settings.rrt_iterations)
+        guides = Guides(self._guides(start, goal, work.seed), work, settings.rrt_iterations)
         yield Progress("guide path", None)
         guides.number(0)
         bound = CostBound(self.scene, start, goal)
@@ -190,11 +126,14 @@ class PushPlanner:
             best = yield from self._improved(best, ends, guides, work)
         for _ in bound.run(settings.bound_boxes if thorough else 0, best.cost):
             yield Progress("lower bound of the cost", best)
+        if settings.planner == "lazy" and settings.easing > 0.0:
+            yield Progress("wider bends", best)
+            best = self._eased(best, work)
         statistics = work.counted(best.guide)
         yield Progress("done", replace(best, cost_bound=bound.value, statistics=statistics))
 
     def _first_plan(
-        self, ends: _Ends, guides: _Guides, work: _Work, thorough: bool
+        self, ends: _Ends, guides: Guides, work: Work, thorough: bool
     ) -> Iterator[Progress]:
         """Search among more and more poses, until there is a plan."""
         settings = self.settings
@@ -219,7 +158,10 @@ class PushPlanner:
                 work.left -= search.expanded
                 work.ways_in |= graph.arrivals > 0 or search.expanded == 0
                 if search.solution is not None:
-                    yield Progress("improving", self._assemble(search, ends[1], guide, work))
+                    yield Progress(
+                        "improving",
+                        self._assemble(search.solution, search.cost, ends[1], guide, work),
+                    )
                     return
                 if search.exhausted:
                     break
@@ -235,10 +177,12 @@ class PushPlanner:
         work.left -= search.expanded
         work.ways_in |= graph.arrivals > 0
         if search.solution is not None:
-            yield Progress("improving", self._assemble(search, ends[1], guide, work))
+            yield Progress(
+                "improving", self._assemble(search.solution, search.cost, ends[1], guide, work)
+            )
 
     def _improved(
-        self, best: PushPlan, ends: _Ends, guides: _Guides, work: _Work
+        self, best: PushPlan, ends: _Ends, guides: Guides, work: Work
     ) -> Generator[Progress, None, PushPlan]:
         """Search below the cost of the best plan: along another guide path, then near its poses.
         Returns the best plan."""
@@ -266,11 +210,18 @@ class PushPlanner:
                 yield Progress(f"improving, round {number + 1}", best)
             work.left -= search.expanded
             if search.solution is not None and search.cost < best.cost:
-                best = self._assemble(search, ends[1], best.guide, work)
+                best = self._assemble(search.solution, search.cost, ends[1], best.guide, work)
                 yield Progress("improving", best)
         return best
 
-    def _refusal(self, ends: _Ends, guides: Sequence[GuidePath], work: _Work) -> PlanningFailed:
+    def _eased(self, best: PushPlan, work: Work) -> PushPlan:
+        """The best plan with wider bends, or itself."""
+        found = gentler(
+            self.scene, best.segments, best.cost, work.robot, work.random, work.statistics
+        )
+        return best if found is None else self._assemble(*found, best.goal, best.guide, work)
+
+    def _refusal(self, ends: _Ends, guides: Sequence[GuidePath], work: Work) -> PlanningFailed:
         widest = max(guide.clearance for guide in guides)
         ways = work.ways_out, work.ways_in
         reason = why_not(self.scene, *ends, work.statistics, ways, work.poses, widest)
@@ -280,7 +231,7 @@ class PushPlanner:
         return PlanningFailed(PlanError.NO_PUSH_SEQUENCE, reason)
 
     def _as_printed(
-        self, ends: _Ends, guide: GuidePath, work: _Work
+        self, ends: _Ends, guide: GuidePath, work: Work
     ) -> Generator[Progress, None, PushPlan]:
         """Layer 2 of the thesis: poses on Gamma alone, and no improvement."""
         start, goal = (self.scene.item.mass_pose(pose) for pose in ends)
@@ -293,7 +244,7 @@ class PushPlanner:
         work.ways_out = work.ways_in = True
         if search.solution is None:
             raise self._refusal(ends, [guide], work)
-        return self._assemble(search, ends[1], guide, work)
+        return self._assemble(search.solution, search.cost, ends[1], guide, work)
 
     def _graph(
         self,
@@ -303,7 +254,7 @@ class PushPlanner:
         attempt: int,
         count: int,
         around: int,
-        work: _Work,
+        work: Work,
     ) -> PushGraph:
         """Poses along a guide path, at its ends, lined up with its narrow parts, ``count``
         scattered ones, and ``around`` two pushes off each end; the first attempt leaves waypoints
@@ -373,10 +324,14 @@ class PushPlanner:
         )
 
     def _assemble(
-        self, search: PushSearch | ThesisSearch, goal: Array, guide: GuidePath, work: _Work
+        self,
+        steps: Sequence[PushStep],
+        cost: float,
+        goal: Array,
+        guide: GuidePath,
+        work: Work,
     ) -> PushPlan:
-        assert search.solution is not None
-        segments = tuple(self.segment(step) for step in search.solution)
+        segments = tuple(self.segment(step) for step in steps)
         clearance = min(s.clearance for s in segments)
-        least, counted = min(work.least, search.cost), work.counted(guide)
-        return PushPlan(goal, segments, search.cost, least, clearance, guide, counted)
+        least, counted = min(work.least, cost), work.counted(guide)
+        return PushPlan(goal, segments, cost, least, clearance, guide, counted)

@@ -4,8 +4,9 @@ Poses of the object are those of its centre of mass here, as in all of the plann
 borders: mechanics works about it, and there are fewer frames to mix up.
 """
 
+import copy
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -117,6 +118,12 @@ class PushScene:
         self._object_points = self.shape.dense_outline(_OUTLINE_SPACING)
         self._robot_points = densified(robot.outline, _OUTLINE_SPACING)
         self._robot_radius = float(np.hypot(*robot.outline.T).max())
+
+    def bending_less(self, part: float) -> "PushScene":
+        """The same scene for plans that use only a part of the trusted curvatures."""
+        scene = copy.copy(self)
+        scene.sides = tuple(replace(side, trusted=side.trusted.scaled(part)) for side in self.sides)
+        return scene
 
     def why_no_sides(self) -> str:
         """Why there is no side to push on, in words."""

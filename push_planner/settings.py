@@ -19,14 +19,15 @@ class PlannerSettings:
         1.0,
         low=0.0,
         high=100.0,
-        doc="Weight lambda_1 of the path length in the cost (2.1) of the guide path "
+        doc="Weight lambda_1 of the path length in the cost (2.1) of the thesis, of the guide path "
         "(dimensionless)",
     )
     clearance_weight: float = bounded(
         0.05,
         low=0.0,
         high=100.0,
-        doc="Weight lambda_2 of the inverse clearance in the cost (2.1) of the guide path (m^2)",
+        doc="Weight lambda_2 of the inverse clearance in the cost (2.1) of the thesis, of the "
+        "guide path (m^2)",
     )
     clearance_levels: int = bounded(
         4, low=1, high=20, doc="Number of minimum clearances for which a guide path is searched"
@@ -80,8 +81,8 @@ class PlannerSettings:
         30000,
         low=1,
         high=10000000,
-        doc="Maximum number of pushes that are evaluated until a first plan is found. What the "
-        "searches with max_expansions leave of it is for a last, long one",
+        doc="Maximum number of pushes that are evaluated until a first plan is found. The part "
+        "that the searches with max_expansions leave is used for a last, long search",
     )
     improvement_expansions: int = bounded(
         1500,
@@ -133,6 +134,13 @@ class PlannerSettings:
         doc="Fraction that plans may use of the curvatures that are stable for all frictions and "
         "centres of mass within the believed intervals; used where it allows more than "
         "friction_trust (dimensionless)",
+    )
+    easing: float = bounded(
+        0.04,
+        low=0.0,
+        high=1.0,
+        doc="Fraction by which the final plan may cost more than the cheapest one, if its pushes "
+        "then have wider bends; 0 keeps the cheapest plan (dimensionless)",
     )
     safety_distance: float = bounded(
         0.012,
