@@ -37,6 +37,7 @@ from push_supervisor import (
     commands,
     events,
 )
+from push_supervisor.arrival import Arrival, arrival
 from push_supervisor.blocked_way import BlockedWay
 from push_supervisor.commands import Command, Question
 from push_supervisor.displacement import PERIOD
@@ -219,14 +220,13 @@ class OneRobotMethod:
         return {"pushes": m.pushes, "replans": m.replans, "solves": t.solves, "failed": t.failures}
 
     def _there(self, goal: Array, seen: Seen) -> bool:
-        off, s = se2.between(goal, seen.object), self._settings
+        off = se2.between(goal, seen.object)
         away, turned = float(np.hypot(off[0], off[1])), abs(float(off[2]))
-        return away <= s.position_tolerance and turned <= s.orientation_tolerance
+        return arrival(self._settings, away, turned).there
 
-    def _at_goal(self, goal: Array | None) -> tuple[bool, str]:
+    def _at_goal(self, goal: Array | None) -> Arrival:
         assert goal is not None and self._seen is not None
-        away, turned = self.errors(self._seen)
-        return self._there(goal, self._seen), f"{1e3 * away:.1f} mm, {turned:.3f} rad"
+        return arrival(self._settings, *self.errors(self._seen))
 
     def _touching(self) -> bool:
         seen = self._seen

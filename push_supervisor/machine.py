@@ -5,7 +5,9 @@ It carries out a plan as Algorithm 4 does.
 States S1-S6 are those of Fig. 2.24. Beyond the thesis: a push that goes wrong is followed by a
 retreat and a new plan from where the object is, a plan is dropped when the object was moved by
 somebody else, and every job ends with a code. A job whose last push has brought the object to its
-goal ends with this push: the robot stays at the object, and backs off when the next job begins.
+goal ends with this push: the robot stays at the object, and backs off when the next job begins. If
+the object has arrived, but not close to its goal, a further plan corrects the error; where that
+fails, the object has still arrived.
 """
 
 from collections.abc import Callable
@@ -15,6 +17,8 @@ from push_model.arrays import Array
 from push_model.jobs import JobError
 from push_model.push_segment import PushSegment
 from push_supervisor import commands, events
+from push_supervisor.arrival import Arrival
+from push_supervisor.attempts import Attempts
 from push_supervisor.commands import Command
 from push_supervisor.events import Event
 from push_supervisor.settings import SupervisorSettings
@@ -25,7 +29,7 @@ from push_supervisor.state import MOVING, State
 class Machine:
     """One job at a time.
 
-    at_goal: tells whether the object is within tolerance of a goal now, and describes the error.
+    at_goal: tells whether the object is at a goal now.
     touching: tells whether the robot may be touching the object now, whoever left it there.
     pushes, replans: of this job so far. New plans are bounded between one progress and the next: a
     push that leaves fewer to do than ever before, since the goal came or the object was moved.
@@ -33,7 +37,7 @@ class Machine:
     """
 
     settings: SupervisorSettings
-    at_goal: Callable[[Array | None], tuple[bool, str]]
+    at_goal: Callable[[Array | None], Arrival]
     touching: Callable[[], bool]
     state: State = State.IDLE
     reason: str = "waiting for a goal"
@@ -48,19 +52,10 @@ class Machine:
     def __post_init__(self) -> None:
         self._out: list[Command] = []
         self._preemptive = False  # what the planner was asked for
-        self._retries = 0
-        self._losses = 0
-        self._waits = 0
-        self._moves = 0  # of the object by others, since the last push that was completed
+        self._tried = Attempts(self.settings)
         self._recovering = ""  # why a new plan follows the retreat under way
         self._backing_off = ""  # why a plan, no new one, follows it
         self._execute = False
-        self._renew()
-
-    def _renew(self) -> None:
-        """The bounds on new plans start anew: a new goal, or an object that others have moved."""
-        self._setbacks = 0  # new plans since the last progress
-        self._least: int | None = None  # pushes left to do at the last progress
 
     @property
     def plan_ready(self) -> bool:
@@ -138,9 +133,8 @@ class Machine:
             self._finish(JobError.PREEMPTED, "a new goal replaces this one")
         self.goal, self.busy, self.error = event.goal, True, JobError.NONE
         self._execute = self.settings.auto_execute and not event.plan_only
-        self.replans = self.pushes = self._retries = self._losses = self._waits = 0
-        self._moves = 0
-        self._renew()
+        self.replans = self.pushes = 0
+        self._tried = Attempts(self.settings)
         self._plan("planning for a new goal")
 
     def _plan(self, reason: str, backed_off: bool = False) -> None:
@@ -151,9 +145,9 @@ class Machine:
         """
         self.segments, self.index = [], 0
         self._recovering = self._backing_off = ""
-        there, error = self.at_goal(self.goal)
-        if there:
-            self._finish(JobError.NONE, f"the object is at the goal: {error}")
+        arrived = self.at_goal(self.goal)
+        if arrived.there and (arrived.close or not self._tried.correcting):
+            self._finish(JobError.NONE, f"the object is at the goal: {arrived.text}")
         elif self._execute and not backed_off and self.touching():
             self._back_off(reason)
         else:
@@ -189,17 +183,12 @@ class Machine:
 
     def _on_plan_failed(self, event: events.PlanFailed) -> None:
         message = event.message
-        if event.retry and not self._preemptive:
+        if event.retry and not self._preemptive and not self._tried.correcting:
             self._ask_plan(f"{message}; looking for a pre-emptive push", preemptive=True)
-        elif event.crowded and self._may_wait():
+        elif event.crowded and self._tried.may_wait():
             self._ask_plan(f"{message}; waiting for other bodies to make way", later=True)
         else:
-            self._finish(event.code, message)
-
-    def _may_wait(self) -> bool:
-        """Count another wait for other bodies; False when there have been enough."""
-        self._waits += 1
-        return self._waits <= self.settings.max_waits
+            self._fail(event.code, message)
 
     def _on_execute(self) -> None:
         if self.plan_ready:
@@ -224,12 +213,11 @@ class Machine:
 
     def _retry(self, message: str, move_away: bool, crowded: bool = False) -> None:
         """Another try at positioning; the robot first backs off when that may help."""
-        self._retries += 1
-        if self._retries > self.settings.max_retries and crowded and self._may_wait():
+        self._tried.retries += 1
+        if self._tried.retries > self.settings.max_retries and crowded and self._tried.may_wait():
             self._position(f"{message}; waiting for other bodies to make way", later=True)
-        elif self._retries > self.settings.max_retries:
-            self._say(commands.Stop())
-            self._finish(JobError.POSITIONING_FAILED, message)
+        elif self._tried.retries > self.settings.max_retries:
+            self._give_up(JobError.POSITIONING_FAILED, message)
         elif move_away:
             self._retreat(message)
         else:
@@ -241,18 +229,17 @@ class Machine:
         self._say(commands.FollowRetreat())
 
     def _on_motion_done(self) -> None:
-        self._losses = 0
+        self._tried.losses = 0
         if self.state is State.POSITIONING:
             self._enter(State.APPROACH, f"approaching side {self.segment.side}")
             self._say(commands.FollowApproach(self.segment))
         elif self.state is State.APPROACH:
-            self._retries = 0
+            self._tried.retries = 0
             self._push()
         elif self.state is State.PUSHING:
             self.pushes += 1
-            self._waits = 0
             following = self.index + 1
-            self._note_progress(len(self.segments) - following)
+            self._tried.progress(len(self.segments) - following)
             if (
                 following < len(self.segments)
                 and self.segments[following].side == self.segment.side
@@ -266,13 +253,15 @@ class Machine:
 
     def _pushed(self, done: int) -> None:
         """The last push on this side is done; the robot backs off only if something follows."""
+        why = f"push {done} of {len(self.segments)} is done"
         if done == len(self.segments):
-            there, error = self.at_goal(self.goal)
-            if there:
+            arrived = self.at_goal(self.goal)
+            if arrived.there and not self._tried.worth_correcting(arrived):
                 self._say(commands.Stop())
-                self._finish(JobError.NONE, f"the goal is reached: {error}")
+                self._finish(JobError.NONE, f"the goal is reached: {arrived.text}")
                 return
-        self._enter(State.DETACHING, f"push {done} of {len(self.segments)} is done")
+            why = f"{why}; the object is {arrived.text} from its goal"
+        self._enter(State.DETACHING, why)
         self._say(commands.FollowRetreat())
 
     def _push(self) -> None:
@@ -293,25 +282,24 @@ class Machine:
         if self.index < len(self.segments):
             self._position("driving to the next side")
             return
-        there, error = self.at_goal(self.goal)
-        if there:
-            self._finish(JobError.NONE, f"the goal is reached: {error}")
-        else:
-            why = f"the object is outside the tolerances of the goal: {error}"
+        arrived = self.at_goal(self.goal)
+        if not arrived.there:
+            why = f"the object is outside the tolerances of the goal: {arrived.text}"
             self._replan(why, JobError.OFF_TARGET, backed_off=True)
-
-    def _note_progress(self, left: int) -> None:
-        """A push is done; left: pushes of the plan that are still to do."""
-        self._moves = 0
-        if self._least is None or left < self._least:
-            self._least, self._setbacks = left, 0
+        elif self._tried.worth_correcting(arrived):
+            self._tried.corrections += 1
+            self._plan_anew(f"the object is {arrived.text} from its goal", backed_off=True)
+        else:
+            self._finish(JobError.NONE, f"the goal is reached: {arrived.text}")
 
     def _replan(
         self, why: str, code: JobError = JobError.EXECUTION_FAILED, backed_off: bool = False
     ) -> None:
-        self._setbacks += 1
-        if self._setbacks > self.settings.max_replans:
-            self._give_up(code, f"{why}; gave up after {self._setbacks - 1} new plans in a row")
+        self._tried.setbacks += 1
+        if self._tried.setbacks > self.settings.max_replans:
+            self._give_up(
+                code, f"{why}; gave up after {self._tried.setbacks - 1} new plans in a row"
+            )
         else:
             self._plan_anew(why, backed_off)
 
@@ -321,7 +309,16 @@ class Machine:
 
     def _give_up(self, code: JobError, message: str) -> None:
         self._say(commands.Stop())
-        self._finish(code, message)
+        self._fail(code, message)
+
+    def _fail(self, code: JobError, message: str) -> None:
+        """The job ends for a reason; after a correction that failed, the object may be there."""
+        arrived = self.at_goal(self.goal)
+        if self._tried.correcting and arrived.there:
+            text = f"the goal is reached: {arrived.text}; the error was not corrected: {message}"
+            self._finish(JobError.NONE, text)
+        else:
+            self._finish(code, message)
 
     def _on_motion_failed(self, event: events.MotionFailed) -> None:
         message = event.message
@@ -339,8 +336,8 @@ class Machine:
 
     def _lost(self, message: str) -> None:
         """The controller is gone; whoever takes its place starts with the step that was cut off."""
-        self._losses += 1
-        if self._losses > self.settings.max_losses:
+        self._tried.losses += 1
+        if self._tried.losses > self.settings.max_losses:
             self._say(commands.Stop())
             self._finish(JobError.NODE_LOST, message)
         elif self.state is State.POSITIONING:
@@ -352,13 +349,13 @@ class Machine:
 
     def _on_moved(self, message: str) -> None:
         """Somebody moved the object: the job begins anew from there."""
-        self._moves += 1
-        if self._moves > self.settings.max_replans:
-            text = f"{message}; it was moved {self._moves} times before a push was completed"
+        self._tried.moves += 1
+        if self._tried.moves > self.settings.max_replans:
+            text = f"{message}; it was moved {self._tried.moves} times before a push was completed"
             self._give_up(JobError.OBJECT_MOVED, text)
             return
         self._say(commands.Stop())
-        self._renew()
+        self._tried.renew()
         self._plan_anew(message)
 
     def _on_map(self, problem: str) -> None:
@@ -370,10 +367,10 @@ class Machine:
 
     def _on_others(self, problem: str) -> None:
         """New plans because of others are bounded like waits for them, not like setbacks."""
-        if self.busy and not self._may_wait():
+        if self.busy and not self._tried.may_wait():
             self._give_up(JobError.EXECUTION_FAILED, problem)
         else:
-            self._renew()
+            self._tried.renew()
             self._on_blocked(problem)
 
     def _on_blocked(self, problem: str) -> None:

@@ -29,6 +29,7 @@ from push_ros.qos import LATCHED, STREAM
 from push_ros.validation import FRAME
 from push_scenario.scenario import Scenario, load_scenario
 from push_supervisor import commands, events, motions
+from push_supervisor.arrival import Arrival, arrival
 from push_supervisor.blocked_way import BlockedWay
 from push_supervisor.commands import Command, Question
 from push_supervisor.displacement import Displacement
@@ -311,11 +312,8 @@ class SupervisorNode(Node):
         local = se2.between(goal, item)
         return float(np.hypot(local[0], local[1])), abs(float(local[2]))
 
-    def _at_goal(self, goal: Any) -> tuple[bool, str]:
-        way, turn = self._errors(goal)
-        s = self.settings
-        there = way <= s.position_tolerance and turn <= s.orientation_tolerance
-        return there, f"{1e3 * way:.1f} mm, {turn:.3f} rad"
+    def _at_goal(self, goal: Any) -> Arrival:
+        return arrival(self.settings, *self._errors(goal))
 
     def _finish(self, code: JobError, message: str) -> None:
         way, turn = self._errors(self.machine.goal)

@@ -8,7 +8,7 @@ class SupervisorSettings:
     """Tolerances, patience and speeds of a job."""
 
     auto_execute: bool = bounded(
-        True, doc="Whether a plan is carried out at once, without the execute command."
+        True, doc="Whether a plan is executed at once, without a call of the service /execute."
     )
     position_tolerance: float = bounded(
         0.012,
@@ -21,6 +21,27 @@ class SupervisorSettings:
         low=1e-3,
         high=3.2,
         doc="Angle of the object from its goal at which it has arrived (rad).",
+    )
+    correct_position: float = bounded(
+        0.004,
+        low=1e-4,
+        high=1.0,
+        doc="Distance of the object from its goal above which the job makes a further plan at its "
+        "end to correct the error, although the object has arrived (m).",
+    )
+    correct_orientation: float = bounded(
+        0.04,
+        low=1e-3,
+        high=3.2,
+        doc="Angle of the object from its goal above which the job makes a further plan at its "
+        "end to correct the error, although the object has arrived (rad).",
+    )
+    max_corrections: int = bounded(
+        1,
+        low=0,
+        high=100,
+        doc="Maximum number of further plans in a job that only correct the error of an object "
+        "that has arrived. With 0, a job ends as soon as the object has arrived.",
     )
     displacement: float = bounded(
         0.02,
@@ -60,14 +81,15 @@ class SupervisorSettings:
         10,
         low=0,
         high=10000,
-        doc="Maximum number in a row of waits for other bodies to clear the way of the robot, and "
-        "of new plans because one of them stands on the way of a push.",
+        doc="Maximum number of interruptions in a row by other bodies: waits until they clear the "
+        "path of the robot, and new plans because they are on the path of a push.",
     )
     wait: float = bounded(
         3.0,
         low=0.1,
         high=600.0,
-        doc="Duration of one wait for other bodies to clear the way, in pose time (s).",
+        doc="Duration of one wait until other bodies clear the path of the robot, in pose time "
+        "(s).",
     )
     approach_speed: float = bounded(
         0.1,
@@ -87,8 +109,8 @@ class SupervisorSettings:
         0.2,
         low=1e-3,
         high=10.0,
-        doc="Deceleration of the robot on its approach, at the end of which it touches the object "
-        "(m/s^2); a lower one makes the contact gentler where the pose of the object is not exact.",
+        doc="Deceleration of the robot at the end of its approach, when it touches the object "
+        "(m/s^2); a lower value makes the contact gentler if the pose of the object is not exact.",
     )
     detach_distance: float = bounded(
         0.06, low=5e-3, high=2.0, doc="Distance that the robot backs off after a push (m)."

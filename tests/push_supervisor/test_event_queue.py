@@ -15,6 +15,7 @@ from push_supervisor import (
     commands,
     events,
 )
+from push_supervisor.arrival import Arrival
 
 
 def short_plan():
@@ -27,7 +28,7 @@ def short_plan():
 
 
 def machine():
-    return Machine(SupervisorSettings(), lambda goal: (False, "far"), lambda: False)
+    return Machine(SupervisorSettings(), lambda goal: Arrival(False, False, "far"), lambda: False)
 
 
 def test_what_a_command_fires_waits_for_the_commands_before_it():

@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from push_supervisor import JobError, Machine, State, SupervisorSettings
+from push_supervisor.arrival import Arrival, arrival
 from push_supervisor.commands import (
     CancelPlan,
     FindPath,
@@ -39,11 +40,11 @@ def segment(side):
     return SimpleNamespace(side=side, object_end=f"end of {side}")
 
 
-def make(there=False, touching=False, **changes):
-    answer = {"there": there, "touching": touching}
+def make(there=False, touching=False, close=True, **changes):
+    answer = {"there": there, "touching": touching, "close": close}
     machine = Machine(
         SupervisorSettings(**changes),
-        lambda goal: (answer["there"], "error"),
+        lambda goal: Arrival(answer["there"], answer["close"], "error"),
         lambda: answer["touching"],
     )
     return machine, answer
@@ -119,6 +120,89 @@ def test_the_last_push_ends_the_job_without_a_retreat():
     assert machine.state is State.IDLE and machine.pushes == 2 and "reached" in machine.reason
     answer["there"], answer["touching"] = False, True
     assert commands(machine.handle(GOAL)) == [FollowRetreat], "the next job begins with it"
+
+
+def almost(**changes):
+    """A job whose last push has brought the object within tolerance, but not close."""
+    machine, answer = make(close=False, **changes)
+    walk(machine, GOAL, planned(0), PATH, DONE, DONE)
+    answer["there"] = True
+    return machine, answer, machine.handle(DONE)
+
+
+def test_an_object_that_arrived_but_not_close_is_corrected_once():
+    machine, _, out = almost()
+    assert commands(out) == [FollowRetreat] and "error from its goal" in machine.reason
+    out = machine.handle(DONE)
+    assert commands(out) == [MakePlan] and machine.state is State.PLANNING and machine.replans == 1
+    out = walk(machine, planned(2), PATH, DONE, DONE)
+    assert commands(out) == [] or machine.state is State.PUSHING
+    out = machine.handle(DONE)
+    assert commands(out) == [Stop, Finish], "one correction, whatever is left"
+    assert out[-1].code is JobError.NONE and machine.pushes == 2
+
+
+def test_without_corrections_an_object_that_arrived_is_there():
+    machine, _, out = almost(max_corrections=0)
+    assert commands(out) == [Stop, Finish] and out[-1].code is JobError.NONE
+    assert machine.replans == 0
+
+
+def test_a_correction_that_fails_leaves_the_goal_reached():
+    machine, _, _ = almost()
+    machine.handle(DONE)
+    out = machine.handle(failed())
+    assert commands(out) == [Finish], "no pre-emptive push for a correction"
+    assert out[0].code is JobError.NONE and "the error was not corrected: m" in machine.reason
+
+    machine, _, _ = almost(max_retries=0)
+    walk(machine, DONE, planned(1))
+    out = walk(machine, PathFailed("no way"))
+    assert commands(out) == [Stop, Finish] and out[-1].code is JobError.NONE
+    assert "no way" in machine.reason
+
+
+def test_a_correction_that_loses_the_goal_is_followed_by_new_plans():
+    machine, answer, _ = almost()
+    walk(machine, DONE, planned(1), PATH, DONE, DONE)
+    answer["there"] = False
+    assert commands(machine.handle(MotionFailed("slipped"))) == [FollowRetreat]
+    assert commands(machine.handle(DONE)) == [MakePlan]
+    out = machine.handle(failed(retry=False))
+    assert commands(out) == [Finish] and out[0].code is JobError.PLANNING_FAILED
+
+
+def test_a_canceled_correction_is_canceled():
+    machine, _, _ = almost()
+    walk(machine, DONE, planned(1), PATH)
+    out = machine.handle(CancelCommanded())
+    assert out[-1].code is JobError.CANCELED
+
+
+def test_the_next_job_may_be_corrected_again():
+    machine, answer, _ = almost()
+    walk(machine, DONE, failed())
+    answer["there"] = False
+    walk(machine, GOAL, planned(0), PATH, DONE, DONE)
+    answer["there"] = True
+    assert commands(machine.handle(DONE)) == [FollowRetreat]
+
+
+@pytest.mark.parametrize(
+    ("away", "turned", "there", "close"),
+    [
+        (0.0, 0.0, True, True),
+        (0.0039, 0.039, True, True),
+        (0.0041, 0.0, True, False),
+        (0.0, 0.041, True, False),
+        (0.0121, 0.0, False, False),
+        (0.0, 0.061, False, False),
+        (float("inf"), float("inf"), False, False),
+    ],
+)
+def test_arrival(away, turned, there, close):
+    found = arrival(SupervisorSettings(), away, turned)
+    assert (found.there, found.close) == (there, close)
 
 
 def test_waits_for_the_execute_command():
@@ -441,9 +525,9 @@ MOTIONS = {
 }
 
 
-@given(st.lists(ANY, max_size=60), st.booleans(), st.booleans(), st.booleans())
-def test_invariants_of_any_walk(events, automatic, there, touching):
-    machine, _ = make(there, touching, auto_execute=automatic)
+@given(st.lists(ANY, max_size=60), st.booleans(), st.booleans(), st.booleans(), st.booleans())
+def test_invariants_of_any_walk(events, automatic, there, touching, close):
+    machine, _ = make(there, touching, close, auto_execute=automatic)
     allowed = automatic
     for event in events:
         before = machine.state
