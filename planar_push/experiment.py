@@ -21,8 +21,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=whole(0), default=1, help="seed of the first trial")
     parser.add_argument(
         "--uncertainty",
-        help="what the nodes do not know: none, mild or hard (docs/results.md); refused if the "
-        "study has no choice",
+        help="what the nodes do not know: none, mild, shape, hard or unknown (docs/results.md); "
+        "refused if the study has no choice",
     )
     parser.add_argument(
         "--world", help="pybullet or planar; refused if the study supports only one"

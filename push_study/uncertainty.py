@@ -165,6 +165,8 @@ UNCERTAINTIES = {
         com=0.01,
         own_draws=True,
     ),
+    # A load that is not centred, and an outline to 5 mm.
+    "shape": Uncertainty(com=0.015, outline=0.005, own_draws=True),
     # Nothing is told but the poses, with lost frames among them, and an outline to 5 mm.
     "unknown": Uncertainty(
         position_noise=1e-3,

@@ -52,6 +52,16 @@ def test_unknown_draws_the_outline_too_and_only_the_estimator_may_find_it_out():
         assert believed.parameters["bridge"]["motion_capture"]["dropout"] == 0.01
 
 
+def test_shape_differs_from_mild_in_outline_and_centre_of_mass_alone():
+    rows = drawn("shape")
+    out = np.array([r["box_outline_m"] for _, _, r in rows])
+    away = np.array([np.hypot(r["box_com_x_m"], r["box_com_y_m"]) for _, _, r in rows])
+    assert -0.005 <= out.min() < -0.0047 and 0.0047 < out.max() <= 0.005
+    assert away.max() <= 0.015 and away.max() > 0.0145
+    mild, shape = uncertainty("mild"), uncertainty("shape")
+    assert replace(shape, com=0.0, outline=0.0, own_draws=False) == mild
+
+
 @pytest.mark.parametrize("name", ["transport_l", "plate_triangle", "swarm_rectangle"])
 def test_every_side_lies_as_far_out_as_was_drawn_in_the_frame_that_motion_capture_sees(name):
     item = load_object(name)
