@@ -25,7 +25,9 @@ class ShoveSettings:
     """How hard the bulldozer shoves."""
 
     speed: float = bounded(0.08, low=0.01, high=0.12, doc="Speed of a push (m/s).")
-    within: float = bounded(0.05, low=0.001, high=1.0, doc="Distance that counts as there (m).")
+    within: float = bounded(
+        0.05, low=0.001, high=1.0, doc="Distance from the goal at which the object has arrived (m)."
+    )
 
 
 class Bulldozer:

@@ -44,7 +44,8 @@ class GroupJobSettings:
         4,
         low=0,
         high=100,
-        doc="Number of failed steps in a row that is tolerated; one more ends the job.",
+        doc="Number of failed steps in a row that a job tolerates; one more ends the job. A step "
+        "is one push and the motions of the robots before it.",
     )
     steps: int = bounded(40, low=1, high=1000, doc="Maximum number of pushes in a job.")
     moving: float = bounded(

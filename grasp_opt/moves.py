@@ -48,7 +48,7 @@ class MoveSettings:
         3e-3,
         low=1e-4,
         high=0.1,
-        doc="Distance from a corner of the path within which a robot continues to the next one "
+        doc="Distance from a corner of the path within which a robot heads for the next corner "
         "(m).",
     )
     straight: float = bounded(

@@ -11,23 +11,34 @@ class PlacementSettings:
 
     model: Literal["limit_surface", "printed"] = bounded(
         "limit_surface",
-        doc="Model of the object's motion in (3.16): 'limit_surface' or (3.17) as printed.",
+        doc="Model of the object's motion in the placement cost (3.16) of the thesis: "
+        "'limit_surface', or 'printed' for (3.17) as printed.",
     )
     steps: int = bounded(
-        50, low=5, high=1000, doc="Number N of time steps into which (3.16) divides the task."
+        50,
+        low=5,
+        high=1000,
+        doc="Number N of time steps into which the placement cost (3.16) of the thesis divides a "
+        "task.",
     )
     position_weight: float = bounded(
-        1e4, low=1e-6, high=1e9, doc="Weight Q of position errors in the cost (3.16) (1/m^2)."
+        1e4,
+        low=1e-6,
+        high=1e9,
+        doc="Weight Q of position errors in the placement cost (3.16) of the thesis (1/m^2).",
     )
     orientation_weight: float = bounded(
-        200.0, low=0.0, high=1e9, doc="Weight Q of orientation errors in the cost (3.16) (1/rad^2)."
+        200.0,
+        low=0.0,
+        high=1e9,
+        doc="Weight Q of orientation errors in the placement cost (3.16) of the thesis (1/rad^2).",
     )
     force_weight: float = bounded(
         0.05,
         low=1e-9,
         high=1e9,
-        doc="Weight R of contact forces in the cost (3.16); forces are fractions of the floor "
-        "friction (dimensionless).",
+        doc="Weight R of contact forces in the placement cost (3.16) of the thesis; forces are "
+        "fractions of the floor friction (dimensionless).",
     )
     gap: float = bounded(
         5e-3, low=0.0, high=1.0, doc="Least gap between the bodies of two robots that push (m)."

@@ -11,7 +11,8 @@ class StepSettings:
         0.03,
         low=0.0,
         high=1.0,
-        doc="Preferred clearance of the object's path beyond a robot's diameter (m).",
+        doc="Preferred clearance of the object's path from obstacles, in addition to the diameter "
+        "of a robot (m).",
     )
     clearance: float = bounded(
         0.01, low=0.0, high=1.0, doc="Least clearance of robots to obstacles between pushes (m)."
@@ -26,7 +27,10 @@ class StepSettings:
         doc="Distance from the object at which robots wait before they make contact (m).",
     )
     back: float = bounded(
-        0.05, low=0.0, high=1.0, doc="Straight last part of a robot's path to its place (m)."
+        0.05,
+        low=0.0,
+        high=1.0,
+        doc="Length of the straight last part of a robot's path to its place at the object (m).",
     )
     speed: float = bounded(
         0.05, low=1e-3, high=5.0, doc="Highest speed of any point of a pushed object (m/s)."
@@ -47,15 +51,20 @@ class StepSettings:
         0.1,
         low=0.0,
         high=1.0,
-        doc="Margin of the compatibility test, a sine; with less, more robots push "
+        doc="Margin of the grasp-task compatibility test (the sine of an angle) with which a "
+        "placement is accepted; if no placement reaches this margin, more robots push "
         "(dimensionless).",
     )
     steps: int = bounded(
-        8, low=5, high=1000, doc="Number N of time steps of (3.16) for one piece of a path."
+        8,
+        low=5,
+        high=1000,
+        doc="Number N of time steps of the placement cost (3.16) of the thesis for one piece of "
+        "the object's path.",
     )
     longest: float = bounded(
         1.5,
         low=0.05,
         high=100.0,
-        doc="Longest piece of the object's path in one step (m).",
+        doc="Greatest length of the piece of the object's path that one step covers (m).",
     )

@@ -11,13 +11,13 @@ class LabBridgeSettings:
         0.01,
         low=1e-3,
         high=0.1,
-        doc="Time between two looks at the robots and at the time limits (s).",
+        doc="Period at which the lab bridge checks the robots and the time limits (s).",
     )
     command_rate: float = bounded(
         60.0,
         low=1.0,
         high=1000.0,
-        doc="Commands per second to one robot at most (Hz). A stop is never delayed.",
+        doc="Greatest number of commands per second to one robot (Hz). A stop is never delayed.",
     )
     command_timeout: float = bounded(
         0.2,
@@ -47,8 +47,8 @@ class LabBridgeSettings:
         0.35,
         low=0.01,
         high=3.2,
-        doc="Greatest angle between a body's vertical axis and the map's (rad). A pose that is "
-        "tilted more is rejected.",
+        doc="Greatest angle between the vertical axis of a body and that of the map (rad). A pose "
+        "with a greater tilt is rejected.",
     )
     pause_when_lost: bool = bounded(
         True,

@@ -50,28 +50,30 @@ class OutlineSettings:
         0.08,
         low=5e-3,
         high=1.0,
-        doc="Length scale of the kernel: the distance over which the error of the first outline "
-        "changes (m)",
+        doc="Length scale of the Gaussian process of the outline estimate: the distance along "
+        "which the error of the first outline changes noticeably (m)",
     )
     slack: float = bounded(
         1e-3,
         low=0.0,
         high=0.05,
-        doc="Depth by which a robot may have been inside the estimated line of contact before the "
-        "outline is changed (m)",
+        doc="Depth by which the centre of a robot may have been inside the estimated line of "
+        "contact (the line of the centres of touching robots) before the outline estimate is "
+        "changed (m)",
     )
     error: float = bounded(
         1.5e-3,
         low=1e-5,
         high=0.05,
-        doc="Standard deviation of where a robot was, in the frame of the object (m)",
+        doc="Standard deviation of a robot's position in the frame of the object that the outline "
+        "estimate assumes (m)",
     )
     contradicted: int = bounded(
         5,
         low=1,
         high=1000,
-        doc="Number of places where robots were stopped, beyond those that agree, at which robots "
-        "have also been: with so many the outline is forgotten",
+        doc="Number of contradictions at which the outline estimate starts anew: places where one "
+        "robot was stopped and another has been, in excess of the places without a contradiction",
     )
 
 

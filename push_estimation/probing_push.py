@@ -21,28 +21,34 @@ from push_model.settings import bounded, settings
 class ProbingSettings:
     """How the robot weaves."""
 
-    speed: float = bounded(0.05, low=1e-3, high=5.0, doc="Speed of the push (m/s).")
+    speed: float = bounded(0.05, low=1e-3, high=5.0, doc="Speed of a probing push (m/s).")
     slide: float = bounded(
         0.63,
         low=0.05,
         high=0.9,
-        doc="Distance by which the object slides to either side, as a fraction of half the "
-        "bumper's width.",
+        doc="Distance by which the object slides to either side in a probing push, as a fraction "
+        "of half the width of the bumper (dimensionless).",
     )
     sharpest: float = bounded(
-        0.4, low=0.01, high=2.0, doc="Greatest curvature times the bumper's distance."
+        0.4,
+        low=0.01,
+        high=2.0,
+        doc="Greatest curvature of a probing push, multiplied by the distance of the bumper from "
+        "the axle (dimensionless).",
     )
     growth: float = bounded(
         0.15,
         low=0.01,
         high=10.0,
-        doc="Growth of the curvature times the bumper's distance (1/s).",
+        doc="Rate at which the curvature of a probing push grows, multiplied by the distance of "
+        "the bumper from the axle (1/s).",
     )
     open: float = bounded(
         0.05,
         low=0.01,
         high=0.5,
-        doc="Angle between bumper and side at which the robot turns the other way (rad).",
+        doc="Angle between the bumper and the pushed side at which a probing push turns in the "
+        "other direction (rad).",
     )
 
 

@@ -38,50 +38,62 @@ class PushPriorSettings:
     """What is assumed of an object before it is pushed, and how much a window counts."""
 
     friction_low: float = bounded(
-        0.05, low=0.01, high=1.0, doc="Lowest friction of robot and object that is considered."
+        0.05,
+        low=0.01,
+        high=1.0,
+        doc="Lowest friction coefficient of bumper and object that the estimator considers "
+        "(dimensionless).",
     )
     friction_high: float = bounded(
-        0.6, low=0.02, high=2.0, doc="Highest friction of robot and object that is considered."
+        0.6,
+        low=0.02,
+        high=2.0,
+        doc="Highest friction coefficient of bumper and object that the estimator considers "
+        "(dimensionless).",
     )
     com_radius: float = bounded(
         0.02,
         low=1e-3,
         high=1.0,
-        doc="Greatest distance of the centre of mass from where the file of the object puts it "
-        "(m).",
+        doc="Greatest distance of the object's centre of mass from its position in the file of the "
+        "object that the estimator considers (m).",
     )
     weight: float = bounded(
         0.3,
         low=0.01,
         high=1.0,
-        doc="Power of the likelihood of a window. Below 1, because the errors of the model are "
-        "alike in successive windows.",
+        doc="Exponent of the likelihood of one window of a push in the estimate of friction and "
+        "centre of mass (dimensionless). It is below 1 because the errors of the model are alike "
+        "in successive windows.",
     )
     model_error: float = bounded(
         0.005,
         low=0.0,
         high=1.0,
-        doc="Standard deviation of the predicted slip, as a fraction of the speed of the push.",
+        doc="Standard deviation of the slip predicted by the estimator, as a fraction of the speed "
+        "of the push (dimensionless).",
     )
     slope_error: float = bounded(
         0.03,
         low=0.0,
         high=1.0,
-        doc="Standard deviation of the predicted slip and turn, as a fraction of themselves.",
+        doc="Standard deviation of the slip and the rotation predicted by the estimator, as a "
+        "fraction of the predicted values (dimensionless).",
     )
     friction_error: float = bounded(
         0.1,
         low=0.0,
         high=1.0,
-        doc="Half width that is added to the interval of the friction, as a fraction of the "
-        "friction: the pressure under a real object is not that of the model.",
+        doc="Half width that is added to the interval of the estimated friction, as a fraction of "
+        "the friction (dimensionless). It allows for a pressure under the object that differs "
+        "from the pressure of the model.",
     )
     com_error: float = bounded(
         1e-3,
         low=0.0,
         high=0.1,
-        doc="Half width that is added to the intervals of the centre of mass (m), for the same "
-        "reason.",
+        doc="Half width that is added to the intervals of the estimated centre of mass (m). It "
+        "allows for a pressure under the object that differs from the pressure of the model.",
     )
 
     def __post_init__(self) -> None:

@@ -28,32 +28,39 @@ _LONGEST = 0.2  # [s] between frames of one window
 class StoppedSettings:
     """What counts as stopped by the object."""
 
-    window: float = bounded(0.5, low=0.05, high=10.0, doc="Time over which a robot is watched (s)")
+    window: float = bounded(
+        0.5,
+        low=0.05,
+        high=10.0,
+        doc="Length of the time window in which the outline estimator compares the commanded and "
+        "the measured motion of a robot (s)",
+    )
     wanted: float = bounded(
         8e-3,
         low=1e-4,
         high=1.0,
-        doc="Distance by which a robot must have been commanded to move, or to come closer, "
-        "within 'window' (m)",
+        doc="Distance by which a robot must be commanded to move, or to come closer to the object, "
+        "within the time 'window' before it can count as stopped by the object (m)",
     )
     share: float = bounded(
         0.3,
         low=0.0,
         high=1.0,
-        doc="Fraction of that distance that a robot which counts as stopped has moved at most",
+        doc="Greatest ratio of the measured to the commanded motion at which a robot counts as "
+        "stopped by the object (dimensionless)",
     )
     reach: float = bounded(
         0.1,
         low=0.0,
         high=10.0,
-        doc="Distance from the estimated line of contact up to which the object may be what stops "
-        "a robot (m)",
+        doc="Greatest distance of a robot from the estimated line of contact (the line of the "
+        "centres of touching robots) at which the object may have stopped the robot (m)",
     )
     gap: float = bounded(
         8e-3,
         low=0.0,
         high=1.0,
-        doc="Gap between two robots up to which one may have stopped the other (m)",
+        doc="Greatest gap between two robots at which one of them may have stopped the other (m)",
     )
 
 

@@ -31,28 +31,39 @@ _OUTLIER = 0.01  # share of windows that anything may have happened in
 class LatencySettings:
     """What is assumed of the latency of the poses, and how much a window counts."""
 
-    low: float = bounded(0.0, low=0.0, high=1.0, doc="Lowest latency that is considered (s).")
-    high: float = bounded(0.15, low=1e-3, high=1.0, doc="Highest latency that is considered (s).")
-    step: float = bounded(1e-3, low=1e-4, high=0.1, doc="Resolution of the latency (s).")
+    low: float = bounded(
+        0.0, low=0.0, high=1.0, doc="Lowest latency of the poses that the estimator considers (s)."
+    )
+    high: float = bounded(
+        0.15,
+        low=1e-3,
+        high=1.0,
+        doc="Highest latency of the poses that the estimator considers (s).",
+    )
+    step: float = bounded(
+        1e-3, low=1e-4, high=0.1, doc="Resolution of the estimated latency of the poses (s)."
+    )
     actuation_lag: float = bounded(
         0.0,
         low=0.0,
         high=1.0,
         doc="Time that the robot takes to reach a commanded speed, from its data sheet (s). It is "
-        "taken off the delay that is seen.",
+        "subtracted from the measured delay.",
     )
     weight: float = bounded(
         0.8,
         low=0.01,
         high=1.0,
-        doc="Power of the likelihood of a window. Below 1, because errors of the motion model are "
-        "alike in successive windows.",
+        doc="Exponent of the likelihood of one time window in the estimate of the latency "
+        "(dimensionless). It is below 1 because the errors of the motion model are alike in "
+        "successive windows.",
     )
     floor: float = bounded(
         3e-3,
         low=0.0,
         high=0.1,
-        doc="Half width that is added to the interval, of errors that all windows share (s).",
+        doc="Half width that is added to the interval of the estimated latency, for errors that "
+        "all windows have in common (s).",
     )
 
     def __post_init__(self) -> None:

@@ -26,7 +26,7 @@ class SpeedDrive(DifferentialDrive):
         "solid ball",
     )
     wheel_friction: float = bounded(
-        1.0, low=0.0, high=3.0, doc="Friction coefficient of wheel and floor"
+        1.0, low=0.0, high=3.0, doc="Friction coefficient of wheel and floor (dimensionless)"
     )
 
 
@@ -46,7 +46,7 @@ class TorqueDrive(DifferentialDrive):
         low=1e-9, high=100.0, doc="Inertia I_w of a wheel about the axle (kg m^2)"
     )
     wheel_friction: float = bounded(
-        1.0, low=0.0, high=3.0, doc="Friction coefficient mu of wheel and floor"
+        1.0, low=0.0, high=3.0, doc="Friction coefficient mu of wheel and floor (dimensionless)"
     )
 
 

@@ -35,9 +35,8 @@ class PolygonShape:
     )
     frame: Literal["centroid", "given"] = bounded(
         "centroid",
-        doc="Frame of the object, in which motion capture gives its pose: 'centroid' has its "
-        "origin in the centroid of the area, wherever the corners have theirs; 'given' is the "
-        "frame of the corners",
+        doc="Frame of the object: 'centroid' puts its origin at the centroid of the polygon; "
+        "'given' keeps the frame of the corners. Motion capture gives the pose of this frame",
     )
 
     def __post_init__(self) -> None:

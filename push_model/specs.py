@@ -157,13 +157,13 @@ class ObjectSpec:
     mass: float = bounded(low=1e-3, high=500.0, doc="Mass of the object (kg)")
     height: float = bounded(low=5e-3, high=2.0, doc="Height of the object (m)")
     floor_friction: float = bounded(
-        low=0.01, high=2.0, doc="Friction coefficient of object and floor"
+        low=0.01, high=2.0, doc="Friction coefficient of object and floor (dimensionless)"
     )
     contact_friction: float = bounded(
-        low=0.0, high=2.0, doc="Friction coefficient of bumper and object"
+        low=0.0, high=2.0, doc="Friction coefficient of bumper and object (dimensionless)"
     )
     feet: int = bounded(
-        4, low=3, high=16, doc="Number of soft feet in simulation, see docs/physics.md"
+        4, low=3, high=16, doc="Number of soft feet under an object in the PyBullet world"
     )
     com: tuple[float, float] = bounded(
         (0.0, 0.0), low=-100.0, high=100.0, doc="Centre of mass in the geometric frame (m)"
@@ -253,7 +253,10 @@ class EnvironmentSpec:
     resolution: float = bounded(0.01, low=1e-3, high=0.5, doc="Cell size of the occupancy grid (m)")
     wall_height: float = bounded(0.1, low=0.01, high=5.0, doc="Height of the walls (m)")
     wall_friction: float = bounded(
-        0.3, low=0.0, high=2.0, doc="Friction coefficient of robot or object and wall"
+        0.3,
+        low=0.0,
+        high=2.0,
+        doc="Friction coefficient of robot or object and wall (dimensionless)",
     )
 
     def __post_init__(self) -> None:

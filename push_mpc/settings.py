@@ -11,8 +11,8 @@ class ControllerSettings:
 
     controller: str = bounded(
         "ltv",
-        doc="Name of the predictive controller: 'ltv' (curvature constraint), "
-        "'contact_force' (contact forces), or MODULE:ATTRIBUTE of another one",
+        doc="Name of the predictive controller: 'ltv' (LTV-MPC with a curvature constraint), "
+        "'contact_force' (LTV-MPC with contact forces), or MODULE:ATTRIBUTE of another one",
     )
 
 
@@ -28,24 +28,30 @@ class MpcSettings:
     to the circles.
     """
 
-    step: float = bounded(0.1, low=0.01, high=1.0, doc="Length T_s of a predicted step (s)")
-    horizon: int = bounded(20, low=2, high=100, doc="Number p of predicted steps")
+    step: float = bounded(
+        0.1, low=0.01, high=1.0, doc="Length T_s of a predicted step of the MPC (s)"
+    )
+    horizon: int = bounded(20, low=2, high=100, doc="Number p of predicted steps of the MPC")
     state_weight: tuple[float, float, float, float, float] = bounded(
         (40.0, 60.0, 1.0, 0.5, 0.02),
-        doc="Diagonal of the weight matrix Q: weights of the errors e_x, e_y, e_theta, e_v, "
-        "e_omega",
+        doc="Diagonal of the weight matrix Q of the MPC: weights of the squared errors e_x, e_y, "
+        "e_theta, e_v, e_omega (in m, m, rad, m/s, rad/s)",
     )
     terminal_factor: float = bounded(
-        5.0, low=0.0, high=1000.0, doc="Factor of the terminal weight, P = factor * Q"
+        5.0,
+        low=0.0,
+        high=1000.0,
+        doc="Factor of the terminal weight of the MPC, P = factor * Q (dimensionless)",
     )
     input_weight: tuple[float, float] = bounded(
         (0.05, 0.002),
-        doc="Diagonal of the weight matrix R_u: weights of the linear and the angular acceleration",
+        doc="Diagonal of the weight matrix R_u of the MPC: weights of the squared linear and "
+        "angular acceleration (in m/s^2, rad/s^2)",
     )
     input_rate_weight: tuple[float, float] = bounded(
         (0.05, 0.002),
-        doc="Diagonal of the weight matrix R_du: weights of the changes of the linear and the "
-        "angular acceleration",
+        doc="Diagonal of the weight matrix R_du of the MPC: weights of the squared changes per "
+        "step of the linear and the angular acceleration (in m/s^2, rad/s^2)",
     )
     max_acceleration: float = bounded(
         0.5, low=0.01, high=20.0, doc="Limit of the linear acceleration (m/s^2)"
@@ -69,13 +75,22 @@ class MpcSettings:
         20,
         low=0,
         high=200,
-        doc="Number of obstacles, the nearest ones, for which the controller has constraints",
+        doc="Greatest number of obstacles for which the controller has constraints; the nearest "
+        "ones are taken",
     )
     slack_linear: float = bounded(
-        1000.0, low=0.0, high=1e6, doc="Linear penalty on the violation of a soft constraint"
+        1000.0,
+        low=0.0,
+        high=1e6,
+        doc="Linear penalty on the violation of a soft constraint in the cost of the MPC "
+        "(violations in m/s, rad/s, m)",
     )
     slack_quadratic: float = bounded(
-        20000.0, low=1e-3, high=1e8, doc="Quadratic penalty on the violation of a soft constraint"
+        20000.0,
+        low=1e-3,
+        high=1e8,
+        doc="Quadratic penalty on the violation of a soft constraint in the cost of the MPC "
+        "(violations in m/s, rad/s, m)",
     )
     max_wheel_slack: float = bounded(
         0.01,
@@ -116,10 +131,13 @@ class ContactForceSettings(MpcSettings):
         0.001,
         low=1e-6,
         high=1e3,
-        doc="Weight R_u of each contact force in the cost of the contact-force controller",
+        doc="Weight R_u of each squared contact force in the cost of the contact-force controller; "
+        "the forces are scaled and have no unit (dimensionless)",
     )
     constraint: bool = bounded(
-        True, doc="Whether the pushing constraint (2.53) is active; false for comparison only"
+        True,
+        doc="Whether the contact-force controller uses the pushing constraint (2.53) of the "
+        "thesis; false for comparison only",
     )
 
 
@@ -129,28 +147,35 @@ class TrackerSettings:
 
     tracked: Literal["object", "robot"] = bounded(
         "object",
-        doc="Which pose a push tracks: that of the object, or that of the robot as in the thesis",
+        doc="Body whose pose the controller tracks in a push: 'object', or 'robot' as in the "
+        "thesis",
     )
     friction_trust: float = bounded(
-        0.85, low=0.1, high=1.0, doc="Fraction of the stable curvature that the controller may use"
+        0.85,
+        low=0.1,
+        high=1.0,
+        doc="Fraction of the stable curvature that the controller may use (dimensionless)",
     )
     slip_warning: float = bounded(
         1.0,
         low=0.0,
         high=60.0,
-        doc="Time by which the path of a push is looked ahead for a bend on which the object is "
-        "expected to slip, once a belief has been published (s)",
+        doc="Time by which the controller looks ahead along the path of a push for a bend on which "
+        "the object is expected to slip (s); without effect until a belief has been published",
     )
     stop_before_slip: bool = bounded(
         True,
-        doc="Whether a push ends before such a bend, so that a new plan is made; otherwise there "
-        "is only a warning",
+        doc="Whether a push ends before a bend on which the object is expected to slip, so that a "
+        "new plan is made; otherwise there is only a warning",
     )
     pose_delay: float = bounded(
-        0.0, low=0.0, high=1.0, doc="Latency of the pose stream that is compensated (s)"
+        0.0, low=0.0, high=1.0, doc="Latency of the pose stream that the controller compensates (s)"
     )
     give_up: float = bounded(
-        5.0, low=0.1, high=600.0, doc="Time without poses after which a task fails (s)"
+        5.0,
+        low=0.1,
+        high=600.0,
+        doc="Time without poses after which the tracking of a trajectory fails (s)",
     )
     position_tolerance: float = bounded(
         0.006, low=1e-4, high=1.0, doc="Position error allowed at the end of a trajectory (m)"
@@ -162,7 +187,8 @@ class TrackerSettings:
         3.0,
         low=0.0,
         high=60.0,
-        doc="Time after the end of a trajectory to reach the tolerances (s)",
+        doc="Time after the end of a trajectory in which its end must be reached within the "
+        "tolerances (s)",
     )
     grasp_filter: float = bounded(
         0.2,
@@ -210,20 +236,22 @@ class TrackerSettings:
         0.08,
         low=1e-3,
         high=5.0,
-        doc="Distance of the robot from its reference at which a task fails (m)",
+        doc="Distance of the robot from its reference at which the tracking of a trajectory fails "
+        "(m)",
     )
     deadline: float = bounded(
         0.0,
         low=0.0,
         high=10.0,
-        doc="Wall time that a solve may take in real time (s); a longer one counts as late; 0: "
-        "no limit",
+        doc="Wall time that a solve of the MPC may take in real time (s); a longer solve counts as "
+        "late; 0: no limit",
     )
     solver_patience: int = bounded(
         10,
         low=1,
         high=10000,
-        doc="Number of failed or late solves in a row after which a task fails",
+        doc="Number of failed or late solves in a row after which the tracking of a trajectory "
+        "fails",
     )
     fade_time: float = bounded(
         0.1,
@@ -235,20 +263,22 @@ class TrackerSettings:
         1.5,
         low=0.1,
         high=60.0,
-        doc="Time of commanded motion over which the motion of a robot is judged (s)",
+        doc="Length of the time window in which the commanded and the measured motion are compared "
+        "to detect a stuck robot (s)",
     )
     stuck_way: float = bounded(
         0.03,
         low=1e-3,
         high=1.0,
-        doc="Distance that must be commanded within stuck_time before a robot can be judged as "
-        "stuck (m)",
+        doc="Distance that must be commanded within the time 'stuck_time' before a robot can be "
+        "judged as stuck (m)",
     )
     blocked_time: float = bounded(
         4.0,
         low=0.1,
         high=600.0,
-        doc="Time that the reference waits for a robot that lags behind before a task fails (s)",
+        doc="Time that the reference waits for a robot that lags behind before the tracking of a "
+        "trajectory fails (s)",
     )
 
     def __post_init__(self) -> None:

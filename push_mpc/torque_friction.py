@@ -31,8 +31,8 @@ class FrictionTrustSettings:
         4.0,
         low=0.0,
         high=100.0,
-        doc="Slip counts only above this many standard deviations of the estimated robot speed "
-        "(dimensionless).",
+        doc="Number of standard deviations of the estimated robot speed that slip must exceed to "
+        "count (dimensionless).",
     )
     loss_time: float = bounded(
         0.1,

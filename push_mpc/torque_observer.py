@@ -50,31 +50,32 @@ class TorqueObserverSettings:
         0.02,
         low=1e-4,
         high=10.0,
-        doc="Standard deviation of the speed of a wheel that rolls (m/s).",
+        doc="Standard deviation of the measured speed of a wheel that rolls without slip (m/s).",
     )
     skid_drift: float = bounded(
         0.02,
         low=0.0,
         high=10.0,
-        doc="Process noise of the estimated position, for wheels that skid sideways (m).",
+        doc="Process noise of the estimated position, for wheels that skid sideways (m/sqrt(s)).",
     )
     speed_drift: float = bounded(
-        0.1, low=1e-6, high=100.0, doc="Process noise of the estimated speed (m/s)."
+        0.1, low=1e-6, high=100.0, doc="Process noise of the estimated speed (m/s/sqrt(s))."
     )
     turn_drift: float = bounded(
-        0.5, low=1e-6, high=1000.0, doc="Process noise of the estimated turn rate (rad/s)."
+        0.5, low=1e-6, high=1000.0, doc="Process noise of the estimated turn rate (rad/s/sqrt(s))."
     )
     drag_drift: float = bounded(
         5.0,
         low=0.0,
         high=1e4,
-        doc="Process noise of the estimated drag of a load (N); 0: no drag is estimated.",
+        doc="Process noise of the estimated drag of a load (N/sqrt(s)); 0: no drag is estimated.",
     )
     moment_drift: float = bounded(
         1.0,
         low=0.0,
         high=1e4,
-        doc="Process noise of the estimated yaw moment of a load (Nm); 0: no moment is estimated.",
+        doc="Process noise of the estimated yaw moment of a load (Nm/sqrt(s)); 0: no moment is "
+        "estimated.",
     )
 
 

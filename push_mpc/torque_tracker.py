@@ -28,7 +28,10 @@ class TorqueTrackerSettings:
     """When a trajectory is done, and when it has gone wrong."""
 
     pose_delay: float = bounded(
-        0.0, low=0.0, high=1.0, doc="Latency of the pose stream that is compensated (s)."
+        0.0,
+        low=0.0,
+        high=1.0,
+        doc="Latency of the pose stream that the torque controller compensates (s).",
     )
     settle_time: float = bounded(
         2.0,

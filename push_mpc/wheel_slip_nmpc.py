@@ -31,8 +31,8 @@ class WheelSlipSettings:
         6,
         low=1,
         high=100,
-        doc="Number M of first steps with torques of their own; later steps repeat the last "
-        "torques.",
+        doc="Number M of predicted steps, from the first one on, that have torques of their own; "
+        "later steps repeat the last torques.",
     )
     state_weight: tuple[float, float, float, float, float] = (2.5, 5.0, 0.25, 0.05, 0.05)
     terminal_factor: float = bounded(
@@ -61,22 +61,27 @@ class WheelSlipSettings:
         "1: as printed in the thesis (dimensionless).",
     )
     constraint: bool = bounded(
-        True, doc="Whether the wheel-slip constraint (2.31)-(2.33) is active."
+        True, doc="Whether the wheel-slip constraint (2.31)-(2.33) of the thesis is active."
     )
     position_limit: float = bounded(
         10.0,
         low=0.1,
         high=1e4,
-        doc="Largest absolute x and y that the constraint (2.19) allows (m).",
+        doc="Largest absolute x and y that the constraint (2.19) of the thesis allows (m).",
     )
     penalty: float = bounded(
-        100.0, low=0.1, high=1e6, doc="Linear penalty rho of the largest constraint violation."
+        100.0,
+        low=0.1,
+        high=1e6,
+        doc="Linear penalty rho of the largest constraint violation in the cost of the NMPC "
+        "(violations in N, rad/s, m).",
     )
     penalty_square: float = bounded(
         1000.0,
         low=1e-3,
         high=1e8,
-        doc="Quadratic penalty rho_2 of the largest constraint violation.",
+        doc="Quadratic penalty rho_2 of the largest constraint violation in the cost of the NMPC "
+        "(violations in N, rad/s, m).",
     )
     iterations: int = bounded(
         100,

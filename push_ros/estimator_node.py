@@ -40,14 +40,17 @@ class EstimatorSettings:
         "bumper.",
     )
     period: float = bounded(
-        1.0, low=0.05, high=3600.0, doc="Shortest time between two messages (s of pose time)."
+        1.0,
+        low=0.05,
+        high=3600.0,
+        doc="Shortest time between two beliefs that the estimator publishes (s of pose time).",
     )
     change: float = bounded(
         0.2,
         low=0.0,
         high=1.0,
-        doc="Change of a value or of an end of its interval, as a fraction of the width of the "
-        "interval, from which on a message is published.",
+        doc="Change of a value, or of an end of its interval, above which the estimator publishes "
+        "a new belief: a fraction of the width of the interval (dimensionless).",
     )
 
 

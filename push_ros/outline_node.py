@@ -43,23 +43,25 @@ class OutlineNodeSettings:
     """Whether outlines are estimated, what is assumed first, and when a message is published."""
 
     enabled: bool = bounded(
-        False, doc="Whether a team of round robots has an estimator of the outline of its object."
+        False,
+        doc="Whether a team of robots with ring bumpers has an estimator of the outline of its "
+        "object.",
     )
     radius: float = bounded(
         0.0,
         low=0.0,
         high=100.0,
-        doc="Radius of a disc about the origin of the object's frame that is assumed as the "
-        "outline at first (m); 0: the outline in the file of the object",
+        doc="Radius of a disc about the origin of the object's frame that the outline estimator "
+        "assumes as the first outline (m); 0: the outline in the file of the object",
     )
     period: float = bounded(
-        1.0, low=0.1, high=3600.0, doc="Time between two estimates (s of pose time)."
+        1.0, low=0.1, high=3600.0, doc="Time between two estimates of the outline (s of pose time)."
     )
     change: float = bounded(
         1e-3,
         low=0.0,
         high=1.0,
-        doc="Distance between the new outline and the published one from which on the new one is "
+        doc="Distance between the new and the published outline above which the new outline is "
         "published (m).",
     )
 

@@ -22,16 +22,17 @@ class RosterSettings:
 
     further: tuple[str, ...] = bounded(
         ("",),
-        doc="Names of robots of the team's type that the scenario does not name and that take "
-        "part, as patterns with * and ?, e.g. x*. May be changed at any time. Only a method that "
-        "takes any number of robots has some. '' stands for no name",
+        doc="Patterns, with * and ?, of the names of further robots: bodies that the scenario does "
+        "not name and that become robots of the team, for example x*. They must be of the team's "
+        "type. The patterns may be changed at any time. Only methods for any number of robots "
+        "accept further robots. An empty string matches no name",
     )
     unknown_radius: float = bounded(
         0.0,
         low=0.0,
         high=10.0,
-        doc="Radius of a body that neither the scenario nor 'further' names, which counts as an "
-        "obstacle; 0: that of the team's robots (m)",
+        doc="Radius of the disc with which a body that neither the scenario nor 'further' names is "
+        "treated as an obstacle (m); 0: the radius of the team's robots",
     )
 
 

@@ -45,7 +45,10 @@ class NamedPoseArraySource:
     """One topic of motion_capture_tracking_interfaces/NamedPoseArray."""
 
     kind: Literal["named_pose_array"] = field(default="named_pose_array", kw_only=True)
-    topic: str = bounded("/mocap/poses", doc="Topic of the poses; not that of the suite's own")
+    topic: str = bounded(
+        "/mocap/poses",
+        doc="Topic of the poses of motion capture; it must not be the topic /poses of this suite",
+    )
 
 
 @settings
@@ -119,7 +122,7 @@ class EPuck2Link:
     host: str = bounded(doc="Address of the robot")
     port: int = bounded(1000, low=1, high=65535, doc="TCP port of the robot")
     steps_per_turn: float = bounded(
-        1000.0, low=1.0, high=1e6, doc="Motor steps in a turn of a wheel"
+        1000.0, low=1.0, high=1e6, doc="Motor steps per revolution of a wheel (dimensionless)"
     )
     max_steps: int = bounded(
         1000, low=1, high=1100, doc="Greatest speed that is sent to a motor (steps/s)"
@@ -175,13 +178,14 @@ class LabSettings:
     )
     stamps: Literal["capture", "receipt"] = bounded(
         "capture",
-        doc="Time that a pose counts for: the stamp of its message, or the time of its arrival",
+        doc="Time to which a pose belongs: 'capture' (the stamp of its message) or 'receipt' (the "
+        "time of its arrival)",
     )
     latency: float | None = bounded(
         None,
         low=0.0,
         high=1.0,
-        doc="Age of a pose when it arrives (s), told to all nodes on /belief; default: not told",
+        doc="Age of a pose when it arrives (s), published on /belief; default: not published",
     )
     latency_spread: float = bounded(
         0.0,

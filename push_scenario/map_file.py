@@ -37,18 +37,25 @@ class MapFile:
         0, low=0, high=1, doc="1 if white pixels are occupied, 0 if black ones are"
     )
     occupied_thresh: float = bounded(
-        0.65, low=0.0, high=1.0, doc="Occupancy above which a cell is occupied"
+        0.65,
+        low=0.0,
+        high=1.0,
+        doc="Occupancy, from 0 to 1, above which a cell is occupied (dimensionless)",
     )
     free_thresh: float = bounded(
         0.196,
         low=0.0,
         high=1.0,
-        doc="Occupancy below which a cell is free; grey 205 is unknown in any case",
+        doc="Occupancy, from 0 to 1, below which a cell is free; grey 205 is always unknown "
+        "(dimensionless)",
     )
     mode: Literal["trinary", "scale", "raw"] = "trinary"
     wall_height: float = bounded(0.1, low=0.01, high=5.0, doc="Height of the walls (m)")
     wall_friction: float = bounded(
-        0.3, low=0.0, high=2.0, doc="Friction coefficient of robot or object and wall"
+        0.3,
+        low=0.0,
+        high=2.0,
+        doc="Friction coefficient of robot or object and wall (dimensionless)",
     )
 
     def __post_init__(self) -> None:

@@ -68,7 +68,7 @@ class ScenarioFile:
     events: tuple[Event, ...] = bounded((), doc="Events while the scenario runs")
     parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
     on: Literal["sim", "lab"] = bounded(
-        "sim", doc="Whether the robots are simulated, or are those of the section lab"
+        "sim", doc="'sim': simulated robots and motion capture; 'lab': those of the section lab"
     )
     lab: LabSettings | None = bounded(None, doc="Drivers of real robots and of motion capture")
 

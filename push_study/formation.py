@@ -83,13 +83,22 @@ class FormationSettings:
     """Where the discs are about the object's centre of mass, in its frame."""
 
     x: tuple[float, ...] = bounded(
-        (0.0,), low=-100.0, high=100.0, doc="Places of the discs along the object's x axis (m)."
+        (0.0,),
+        low=-100.0,
+        high=100.0,
+        doc="Coordinates x of the discs of the formation in the object's frame (m).",
     )
     y: tuple[float, ...] = bounded(
-        (0.0,), low=-100.0, high=100.0, doc="Places of the discs along the object's y axis (m)."
+        (0.0,),
+        low=-100.0,
+        high=100.0,
+        doc="Coordinates y of the discs of the formation in the object's frame (m).",
     )
     tick: float = bounded(
-        0.02, low=1e-3, high=1.0, doc="Time from a command until the disc is at its place (s)."
+        0.02,
+        low=1e-3,
+        high=1.0,
+        doc="Time from a command until a disc of the formation is at its place (s).",
     )
 
     def __post_init__(self) -> None:

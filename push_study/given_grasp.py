@@ -37,25 +37,44 @@ class GraspSettings:
 
     choice: Literal["given", "optimised", "selected", "random"] = bounded(
         "optimised",
-        doc="Grasp: given, the places of 'ways'; optimised, the placement of section 3.2; "
-        "selected, the best of random grasps by MHD, refined; random, the first one that passes.",
+        doc="Choice of the grasp: 'given' (the places of 'ways'), 'optimised' (the placement of "
+        "section 3.2), 'selected' (the best of random grasps by MHD, refined) or 'random' (the "
+        "first random grasp that passes the test).",
     )
     ways: tuple[float, ...] = bounded(
-        (), low=0.0, high=1e3, doc="Places along the outline, where they are given (m)."
+        (), low=0.0, high=1e3, doc="Places of the robots along the outline with choice 'given' (m)."
     )
     force_share: float = bounded(
-        0.9, low=0.1, high=1.0, doc="Optimised: fraction of its traction that a robot may use."
+        0.9,
+        low=0.1,
+        high=1.0,
+        doc="Fraction of its traction that a robot may use with choice 'optimised' "
+        "(dimensionless).",
     )
-    tries: int = bounded(500, low=1, high=1_000_000, doc="Selected, random: grasps that are drawn.")
-    seed: int = bounded(0, low=0, high=2**32 - 1, doc="Selected, random: seed of the draws.")
+    tries: int = bounded(
+        500,
+        low=1,
+        high=1_000_000,
+        doc="Number of random grasps that are drawn with choice 'selected' or 'random'.",
+    )
+    seed: int = bounded(
+        0,
+        low=0,
+        high=2**32 - 1,
+        doc="Seed of the random grasps with choice 'selected' or 'random'.",
+    )
     margin: float = bounded(
         0.02,
         low=0.0,
         high=1.0,
-        doc="Selected, random: least margin of the compatibility test, a sine.",
+        doc="Least margin of the compatibility test with choice 'selected' or 'random', the sine "
+        "of an angle (dimensionless).",
     )
     gap: float = bounded(
-        0.015, low=0.0, high=1.0, doc="Selected, random: least gap between robots (m)."
+        0.015,
+        low=0.0,
+        high=1.0,
+        doc="Least gap between robots with choice 'selected' or 'random' (m).",
     )
 
 

@@ -57,7 +57,7 @@ class PlanarSettings:
         1e-3,
         low=0.0,
         high=1.0,
-        doc="Change of every contact force below which the iterations end (N).",
+        doc="Change of the contact forces below which the iterations of the planar world end (N).",
     )
 
 

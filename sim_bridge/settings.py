@@ -47,8 +47,8 @@ class MotionCaptureSettings:
         0.0,
         low=0.0,
         high=1.0,
-        doc="Mean time from the instant that a frame shows to its publication (s). Any value is "
-        "kept exactly: the instant may lie between two ticks of the simulation.",
+        doc="Mean time from the measurement of a frame to its publication (s). Any value is kept "
+        "exactly: the time of the measurement may lie between two ticks of the simulation.",
     )
     latency_jitter: float = bounded(
         0.0,
@@ -66,11 +66,12 @@ class MotionCaptureSettings:
 class BridgeSettings:
     """Pace, safety and publishing of the bridge."""
 
-    world: str = bounded("pybullet", doc="Kind of the simulated world: pybullet or planar.")
+    world: str = bounded("pybullet", doc="Kind of the simulated world: 'pybullet' or 'planar'.")
     lockstep: bool = bounded(
         False,
-        doc="Whether every tick waits until all commanded robots have answered the last one, "
-        "however long that takes. Otherwise the world runs at real_time_factor.",
+        doc="Whether the simulation waits in every tick until all commanded robots have answered "
+        "the last frame, however long this takes. Otherwise the pace of the simulation is "
+        "real_time_factor.",
     )
     real_time_factor: float = bounded(
         1.0,
@@ -95,8 +96,8 @@ class BridgeSettings:
         2.0,
         low=0.05,
         high=600.0,
-        doc="Wall time without an answer to a tick in lockstep after which a warning names the "
-        "robots that are waited for (s). The world waits on.",
+        doc="Wall time without an answer to a frame in lockstep after which a warning names the "
+        "robots that have not answered (s). The simulation continues to wait.",
     )
     discovery_time: float = bounded(
         0.5,
@@ -108,7 +109,8 @@ class BridgeSettings:
         25.0,
         low=0.1,
         high=1000.0,
-        doc="Transforms on /tf per second of simulated time (Hz). Markers come at a fifth of it.",
+        doc="Transforms on /tf per second of simulated time (Hz). Markers are published at a fifth "
+        "of this rate.",
     )
     seed: int = bounded(
         1, low=0, high=2**62, doc="Seed of the noise, drop-outs and latency of the poses."

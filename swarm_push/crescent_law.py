@@ -68,47 +68,50 @@ class CrescentLawSettings:
         0.3,
         low=0.0,
         high=100.0,
-        doc="Proportional gain of a pushing robot's velocity along the line of contact (1/s); "
-        "low, because wheels that slip sideways transmit no push",
+        doc="Proportional gain of a pushing robot's velocity along the outline of the object "
+        "(1/s); low, because wheels that slip sideways transmit no push",
     )
     press: float = bounded(
         0.01,
         low=0.0,
         high=1.0,
-        doc="Distance by which the density lies inside the line of contact during a push, so that "
-        "robots keep pressing (m)",
+        doc="Distance by which the density lies inside the line of contact (the line of the "
+        "centres of touching robots) during a push, so that robots keep pressing (m)",
     )
     wait: float = bounded(
         6e-3,
         low=0.0,
         high=1.0,
-        doc="Distance from the line of contact at which robots wait until the push begins (m)",
+        doc="Distance from the line of contact (the line of the centres of touching robots) at "
+        "which robots wait until the push begins (m)",
     )
     clearance: float = bounded(
         0.02,
         low=1e-3,
         high=1.0,
-        doc="Gap to the object that robots keep while they go round it (m)",
+        doc="Gap to the object that robots keep while they move around it (m)",
     )
     slide: float = bounded(
         0.015,
         low=0.0,
         high=0.04,
-        doc="Depth inside the line of contact at which a robot that slides along the object may "
-        "head for its place (m)",
+        doc="Depth inside the line of contact (the line of the centres of touching robots) at "
+        "which a robot that slides along the object may aim (m)",
     )
     contact: float = bounded(
         0.015,
         low=1e-3,
         high=1.0,
-        doc="Distance from the line of contact within which a robot counts as in contact (m)",
+        doc="Distance from the line of contact (the line of the centres of touching robots) within "
+        "which a robot counts as in contact (m)",
     )
     least: float = bounded(
         0.3,
         low=0.0,
         high=0.99,
-        doc="Least ratio of the speed at which the outline recedes from a place of a robot to "
-        "the highest such speed; places with less are not used (dimensionless)",
+        doc="Lowest speed at which the outline moves away from the place of a robot during the "
+        "desired motion, as a fraction of the highest such speed along the outline; places with a "
+        "lower speed are not used (dimensionless)",
     )
     hold: float = bounded(
         0.25,
@@ -128,7 +131,8 @@ class CrescentLawSettings:
         12.0,
         low=1.0,
         high=600.0,
-        doc="Time without progress at a wall after which the object is moved away from it (s)",
+        doc="Time without progress of an object at a wall after which the object is moved away "
+        "from the wall (s)",
     )
     budge: float = bounded(
         0.02,

@@ -24,9 +24,9 @@ class SwarmJobSettings(ArrivalSettings, LivenessSettings):
         30.0,
         low=1.0,
         high=3600.0,
-        doc="Time without the object coming closer to its target after which the job fails, if "
-        "the robots are only just enough: their traction is little more than needed, or "
-        "one robot is left to turn the object (s)",
+        doc="Time without the object coming closer to its target after which the job fails, if the "
+        "robots are hardly sufficient: their traction is little more than needed, or a single "
+        "robot is left to turn the object (s)",
     )
     alone: float = bounded(
         10.0,

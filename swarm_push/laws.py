@@ -18,8 +18,9 @@ class LawSettings:
 
     law: Literal["crescent", "thesis"] = bounded(
         "crescent",
-        doc="Law that moves the swarm: 'crescent' pushes with a density along the object's rim, "
-        "'thesis' is the law of chapter 4 as printed",
+        doc="Control law of the swarm: 'crescent' moves a density along the part of the object's "
+        "outline that robots must push; 'thesis' is the law of chapter 4 of the thesis as "
+        "printed, with its errata corrected",
     )
 
 

@@ -31,51 +31,52 @@ class TrackSettings:
         0.2,
         low=0.0,
         high=10.0,
-        doc="Preferred clearance of the object's way from walls, beyond a robot's diameter (m). "
-        "If there is no such way, 'room' is tried next",
+        doc="Preferred clearance of the object's path from walls, in addition to the diameter of a "
+        "robot (m). If there is no such path, 'room' is tried next",
     )
     room: float = bounded(
         0.02,
         low=0.0,
         high=1.0,
-        doc="Clearance of the object's way from walls, beyond a robot's diameter, if there is no "
-        "way with the clearance 'wide' (m). If there is none with this either, 'least_room' is "
-        "tried",
+        doc="Clearance of the object's path from walls, in addition to the diameter of a robot, if "
+        "there is no path with the clearance 'wide' (m). If there is no path with this clearance "
+        "either, 'least_room' is tried",
     )
     least_room: float = bounded(
         2e-3,
         low=0.0,
         high=1.0,
-        doc="Minimum clearance of the object's way from walls, beyond a robot's diameter (m). "
-        "Without such a way the job fails",
+        doc="Minimum clearance of the object's path from walls, in addition to the diameter of a "
+        "robot (m). Without such a path the job fails",
     )
     ahead: float = bounded(
         0.25,
         low=0.01,
         high=10.0,
-        doc="Look-ahead distance along the object's way to the pose that the swarm pushes it "
-        "towards (m). A turn counts by the distance that the farthest point of the object moves",
+        doc="Look-ahead distance along the object's path to the pose towards which the swarm "
+        "pushes the object (m). A turn counts by the distance that the farthest point of the "
+        "object moves",
     )
     corner: float = bounded(
         0.03,
         low=1e-3,
         high=1.0,
-        doc="Distance from the end of a piece of the way within which the object goes on with the "
-        "next piece (m)",
+        doc="Distance from the end of a piece of the path within which the object continues with "
+        "the next piece (m)",
     )
     off: float = bounded(
         0.06,
         low=5e-3,
         high=10.0,
-        doc="Distance of the object from its way beyond which another way is planned (m)",
+        doc="Distance of the object from its path above which a new path is planned (m)",
     )
     budget: int = bounded(
         2500,
         low=100,
         high=1_000_000,
-        doc="Poses of the object that are checked per control tick while a way is planned. One "
-        "takes 1 to 3 microseconds, so that this bounds the time of a tick; a greater number "
-        "finds the way in fewer ticks",
+        doc="Number of poses of the object that are checked per control tick while a path is "
+        "planned. One check takes 1 to 3 microseconds, so this number bounds the duration of a "
+        "tick; with a greater number the path is found in fewer ticks",
     )
 
 

@@ -22,13 +22,15 @@ class PotentialSettings:
         1.4,
         low=1.0,
         high=10.0,
-        doc="Radius d_rep of the repulsive zone around the object, in radii of the object",
+        doc="Radius d_rep of the repulsive zone around the object, as a multiple of the radius of "
+        "the object (dimensionless)",
     )
     attraction: float = bounded(
         1.8,
         low=1.0,
         high=10.0,
-        doc="Radius d_att of the attractive zone around the object, in radii of the object",
+        doc="Radius d_att of the attractive zone around the object, as a multiple of the radius of "
+        "the object (dimensionless)",
     )
     cone: float = bounded(
         0.8,
@@ -42,7 +44,7 @@ class PotentialSettings:
         low=0.1,
         high=1.0,
         doc="Distance of the two wires W_in and W_out of the magnetic zone from the object's "
-        "centre, in radii of the object",
+        "centre, as a multiple of the radius of the object (dimensionless)",
     )
     overlap: float = bounded(
         0.1,

@@ -24,12 +24,17 @@ class RivalSettings:
     """What all rivals have."""
 
     position_tolerance: float = bounded(
-        0.1, low=1e-3, high=10.0, doc="Distance from the target at which it is reached (m)."
+        0.1,
+        low=1e-3,
+        high=10.0,
+        doc="Distance of the object from a target at which the target counts as reached (m).",
     )
     orientation: bool = bounded(
-        False, doc="Whether headings of goals matter. Rivals take positions only: false."
+        False,
+        doc="Whether the headings of goals matter. It must be false, because this method controls "
+        "only positions.",
     )
-    seed: int = bounded(0, low=0, high=2**31 - 1, doc="Seed of the random draws.")
+    seed: int = bounded(0, low=0, high=2**31 - 1, doc="Seed of the random numbers of this method.")
 
 
 @dataclass(frozen=True)
