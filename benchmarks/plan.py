@@ -39,14 +39,14 @@ _BENDS = tuple(float(b) for b in np.linspace(-0.98, 0.98, 9))
 
 @dataclass(frozen=True)
 class Outcome:
-    """Of one problem: CPU time [s] to the first plan and to the end, cost [m] of each plan."""
+    """Of one problem: CPU time [s] to the first plan and to the end, cost [s] of each plan."""
 
     start: np.ndarray
     goal: np.ndarray
     first: float
     final: float
     costs: tuple[float, ...]
-    bound: float  # [m] lower bound of the cost of a plan
+    bound: float  # [s] lower bound of the cost of a plan
     why: str = ""
 
 
@@ -89,7 +89,7 @@ def attempt(planner: PushPlanner, start: np.ndarray, goal: np.ndarray) -> Outcom
 
 
 def exhaustive(planner: PushPlanner, start: np.ndarray, goal: np.ndarray, seed: int) -> float:
-    """Cost [m] of the plan of an exhaustive search; inf if it finds none."""
+    """Cost [s] of the plan of an exhaustive search; inf if it finds none."""
     scene = planner.scene
     start, goal = scene.item.mass_pose(start), scene.item.mass_pose(goal)
     random = np.random.default_rng(seed)
@@ -175,7 +175,7 @@ def study(name: str, planner: PushPlanner, count: int, seed: int) -> dict[str, A
         "first_s": {q: float(np.quantile(first, q)) for q in (0.5, 0.95, 1.0)},
         "final_s": {q: float(np.quantile(final, q)) for q in (0.5, 0.99, 1.0)},
         "failure_s": max((o.final for o in outcomes if not o.costs), default=0.0),
-        "cost_m": float(last.mean()),
+        "cost_s": float(last.mean()),
         "gap_median": float(np.median(gap)),
         "saved_mean": float(saved.mean()),
         "worse": worse,
@@ -186,7 +186,7 @@ def study(name: str, planner: PushPlanner, count: int, seed: int) -> dict[str, A
         f"most {first.max():.3f} s; final median {np.median(final):.3f} s, "
         f"99 % {np.quantile(final, 0.99):.3f} s, most {final.max():.3f} s; "
         f"a failure at most {result['failure_s']:.3f} s\n"
-        f"  {name}: cost {last.mean():.3f} m on average, {100 * saved.mean():.1f} % less than the "
+        f"  {name}: cost {last.mean():.2f} s on average, {100 * saved.mean():.1f} % less than the "
         f"first plan's; {100 * np.median(gap):.0f} % (median) above the lower bound",
         flush=True,
     )
@@ -194,7 +194,7 @@ def study(name: str, planner: PushPlanner, count: int, seed: int) -> dict[str, A
     for number, outcome in enumerate(outcomes):
         if not outcome.costs:
             cost = exhaustive(planner, outcome.start, outcome.goal, seed)
-            found = "none either" if np.isinf(cost) else f"{cost:.3f} m"
+            found = "none either" if np.isinf(cost) else f"{cost:.2f} s"
             print(f"    {name} {number}: {outcome.why}; exhaustive search: {found}", flush=True)
             if np.isfinite(cost):
                 missed.append(number)
@@ -216,7 +216,7 @@ def kind_study(kind: str, count: int, seed: int) -> dict[str, Any]:
         if not outcome.costs:
             cost = exhaustive(planner, problem.start, problem.goal, seed)
             print(
-                f"    {kind} {number}: {outcome.why}; exhaustive search: {cost:.3f} m", flush=True
+                f"    {kind} {number}: {outcome.why}; exhaustive search: {cost:.2f} s", flush=True
             )
             if np.isfinite(cost):
                 missed.append(number)
@@ -272,8 +272,8 @@ def scenarios() -> tuple[dict[str, Any], dict[str, Bound]]:
             continue
         first, final = outcome.costs[0], outcome.costs[-1]
         print(
-            f"  {name}: first {outcome.first:.3f} s, {first:.3f} m; "
-            f"final {outcome.final:.3f} s, {final:.3f} m; at least {outcome.bound:.3f} m"
+            f"  {name}: first {outcome.first:.3f} s, {first:.2f} s; "
+            f"final {outcome.final:.3f} s, {final:.2f} s; at least {outcome.bound:.2f} s"
         )
         result[name] = {
             "first_s": outcome.first,

@@ -6,11 +6,11 @@ bounded curvature (dubins_bound.py). Obstacles lengthen it: the object's centre 
 distance to them, and it moves at most ``fastest`` times as far as the robot. The cost (2.10) of a
 plan is therefore at least the smallest of these:
 
-- one run: its bound, and the cost of one push;
+- one run: the time of its bound, and that of one push to begin and to end;
 - two runs: the smallest sum of two bounds over all poses at which the side is changed, and the
-  costs of two pushes and of one change;
+  times of two pushes to begin and of one change;
 - three runs or more: the distance that the centre must move, or the length in which the object can
-  turn as far as it must, and the costs of three pushes and of two changes.
+  turn as far as it must, and the times of three pushes to begin and of two changes.
 
 The smallest sum over poses is found by branch and bound. A box of positions and headings has a
 bound of its own, and the box with the lowest bound is divided next. The work may stop at any time:
@@ -112,7 +112,8 @@ def _of_boxes(
     radii: Any,
     changes: Any,
     fastest: Any,
-    push_cost: float,
+    pace: float,
+    begin: float,
     ways: Any,
     place_scale: float,
     least: float,
@@ -121,7 +122,7 @@ def _of_boxes(
     oy: float,
     scale: float,
 ) -> Any:
-    """Lower bounds [m] of the cost of plans of two runs that change the side within a box.
+    """Lower bounds [s] of the cost of plans of two runs that change the side within a box.
 
     Parameters
     ----------
@@ -130,8 +131,9 @@ def _of_boxes(
     starts, goals: ``(sides, 3)`` poses of the robot in contact at the start and at the goal.
     contacts: ``(sides, 3)`` the same in the frame of the object.
     radii: ``(sides, 2)`` [m] smallest turning radii to the left and to the right.
-    changes: ``(sides, sides)`` [m] costs of a change of the side; infinite on the diagonal.
+    changes: ``(sides, sides)`` [s] of a change of the side; infinite on the diagonal.
     fastest: ``(sides,)`` how far the centre moves at most while the robot drives 1 m.
+    pace: [s/m] of a push. begin: [s] that each push takes longer.
     ways: ``(2, levels, rows, columns)`` [m] least way of the centre from the start and to the goal,
         see ``_windows``.
     place_scale: [1/m] places of ``ways`` per metre.
@@ -163,8 +165,8 @@ def _of_boxes(
             second[side] = max(length, left / fastest[side])
         for a in range(sides):
             for b in range(sides):
-                result[k] = min(result[k], first[a] + second[b] + changes[a, b])
-        result[k] += 2.0 * push_cost
+                result[k] = min(result[k], pace * (first[a] + second[b]) + changes[a, b])
+        result[k] += 2.0 * begin
     return result
 
 
@@ -204,7 +206,7 @@ def least_way(field: DistanceField, start: Array, goal: Array, least: float) -> 
 class CostBound:
     """The bound for one start and one goal in a scene.
 
-    value: [m] the cost of no plan is less. one, several: [m] the same for plans of one run, and of
+    value: [s] the cost of no plan is less. one, several: [s] the same for plans of one run, and of
     three or more; ``value`` is not higher. fastest: ``(sides,)`` how far the centre of mass moves
     at most while the robot drives 1 m.
     """
@@ -224,8 +226,7 @@ class CostBound:
         radii = 1.0 / np.abs(limits)
         x, y = np.array([s.grasp[:2] for s in sides]).T[:, :, None]
         fastest = np.maximum(np.hypot(1.0 - limits * y, limits * x).max(axis=1), 1.0)
-        apart = contacts[:, None, :2] - contacts[None, :, :2]
-        changes = np.hypot(apart[..., 0], apart[..., 1]) + settings.side_change_cost
+        pace, begin, changes = scene.time.pace, scene.time.begin, scene.time.changes.copy()
         np.fill_diagonal(changes, math.inf)
         floor = origin_floor(scene.shape)
         least = floor + min(scene.leaving(start), settings.safety_distance) if floor > 0.0 else 0.0
@@ -233,7 +234,7 @@ class CostBound:
         places = field.args[2] / _stride(field)
         self.fastest = fastest
         self._known = (
-            *(starts, goals, contacts, radii, changes, fastest, settings.push_cost),
+            *(starts, goals, contacts, radii, changes, fastest, pace, begin),
             *(ways, places, least, field.values, *field.args),
         )
         speed, change = float(fastest.max()), float(changes.min())
@@ -242,17 +243,17 @@ class CostBound:
         turn = abs(float(se2.wrap(goal[2] - start[2])))
         length = max(max(way, straight) / speed, turn * float(radii.min()))
         runs = [_run(*a, *b, r, 0.0, 0.0) for a, b, r in zip(starts, goals, radii, strict=True)]
-        self.one = settings.push_cost + max(length, min(runs))
-        self.several = 3.0 * settings.push_cost + 2.0 * change + length
-        self._fixed, self._speed = 2.0 * settings.push_cost + change, speed
-        self.value = min(self.one, self.several, self._fixed + length)
+        self.one = begin + pace * max(length, min(runs))
+        self.several = 3.0 * begin + 2.0 * change + pace * length
+        self._fixed, self._speed = 2.0 * begin + change, speed / pace
+        self.value = min(self.one, self.several, self._fixed + pace * length)
         self._centre = 0.5 * (start + goal)[:2]
         self._turning = float(radii.mean())
 
     def run(self, boxes: int, cost: float = math.inf) -> Iterator[None]:
         """Raise the bound by dividing up to so many boxes. Yields after each slice.
 
-        cost: [m] of a known plan; the bound is not raised above it.
+        cost: [s] of a known plan; the bound is not raised above it.
         """
         most = min(self.one, self.several, cost)
         reach = 0.5 * self._speed * (most - self._fixed)  # the ellipse of the centre is within it
@@ -274,7 +275,7 @@ class CostBound:
         self.value = max(self.value, min(queue[0][0] if queue else math.inf, most))
 
     def of_boxes(self, boxes: Array) -> Array:
-        """Bounds ``(n,)`` [m] of plans of two runs that change the side in a box ``(n, 5)``: x, y
+        """Bounds ``(n,)`` [s] of plans of two runs that change the side in a box ``(n, 5)``: x, y
         [m], theta [rad] of its centre, half its width in x and y [m] and in theta [rad]."""
         found: Array = _of_boxes(boxes, *self._known)
         return found

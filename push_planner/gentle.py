@@ -34,12 +34,12 @@ def gentler(
     robot: Array | None,
     random: np.random.Generator,
     statistics: SearchStatistics,
-) -> tuple[tuple[PushStep, ...], float] | None:
-    """Pushes from the same start to the same goal with wider bends, and their cost [m].
+) -> tuple[PushStep, ...] | None:
+    """Pushes from the same start to the same goal with wider bends.
 
     Parameters
     ----------
-    segments: the pushes of a plan. cost: [m] of it. robot: ``(3,)`` pose of the robot, or None.
+    segments: the pushes of a plan. cost: [s] of it. robot: ``(3,)`` pose of the robot, or None.
 
     The result costs at most the part ``easing`` more. It is None if nothing gentler was found.
     """
@@ -52,14 +52,13 @@ def gentler(
             steps, cost = found
             break
     result = []
-    left = limit / cost  # of what a push may become longer
+    left = limit / cost  # of what a push may take longer
     for number, step in enumerate(steps):
         leaving = scene.leaving(step.object_start) if number == 0 else np.inf
-        wide = _widest(scene, step, left * step.curve.length, leaving, statistics)
-        cost += wide.curve.length - step.curve.length
+        wide = _widest(scene, step, left * step.time, leaving, statistics)
         result.append(wide)
     changed = any(new is not old for new, old in zip(result, given, strict=False))
-    return (tuple(result), cost) if changed else None
+    return tuple(result) if changed else None
 
 
 def _step(scene: PushScene, segment: PushSegment) -> PushStep:
@@ -68,7 +67,7 @@ def _step(scene: PushScene, segment: PushSegment) -> PushStep:
     side = next(side for side in scene.sides if side.index == s.side)
     curve = PushCurve(s.robot_start, s.robot_end, s.k_start, s.k_end, s.length)
     start, end = item.mass_pose(s.object_start), item.mass_pose(s.object_end)
-    return PushStep(side, curve, start, end, s.clearance)
+    return PushStep(side, curve, start, end, s.clearance, scene.time.of_push(curve))
 
 
 def _near(
@@ -79,7 +78,7 @@ def _near(
     random: np.random.Generator,
     statistics: SearchStatistics,
 ) -> tuple[tuple[PushStep, ...], float] | None:
-    """The cheapest pushes by way of poses near those of a plan, below a cost [m]."""
+    """The cheapest pushes by way of poses near those of a plan, below a cost [s]."""
     found, cost = None, (1.0 + _FIRST) * limit
     start, goal = steps[0].object_start, steps[-1].object_end
     between = [step.object_end for step in steps[:-1]]
@@ -100,7 +99,7 @@ def _near(
 def _widest(
     scene: PushScene, step: PushStep, longest: float, leaving: float, statistics: SearchStatistics
 ) -> PushStep:
-    """The same push on the curve with the widest bends that is no longer than so much [m].
+    """The same push on the curve with the widest bends that takes no longer than so much [s].
 
     leaving: [m] clearance that will do over the first centimetres, see ``PushScene.kept``.
     """
@@ -114,10 +113,10 @@ def _widest(
         curve = shortest_push_curve(
             step.curve.start, step.curve.end, narrow.minimum, narrow.maximum
         )
-        if curve is None or curve.length > longest:
+        if curve is None or (time := scene.time.of_push(curve)) > longest:
             continue
         clearance = scene.kept(curve, step.side, leaving)
         if clearance is not None:
             statistics.feasible += 1
-            return PushStep(step.side, curve, step.object_start, step.object_end, clearance)
+            return PushStep(step.side, curve, step.object_start, step.object_end, clearance, time)
     return step

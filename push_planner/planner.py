@@ -37,6 +37,7 @@ _WORTH = 0.002  # of the cost that a further plan must save
 _NEARBY = 40  # poses about each one that an improvement moves
 _SIZES = 9  # rounds after which an improvement moves poses by the first size again
 _WAYPOINTS = 30  # at most, in the first attempt
+_HASTE = 0.5  # of the time of a change of the side that counts, in searches along guide paths
 _REACH = (10.0, 3.0)  # waypoints that a push leads on at most: of the settings; of a long path
 
 
@@ -69,7 +70,7 @@ class PushPlanner:
         check_pose(self.scene, pose, what, occupied)
 
     def lower_bound(self, start: Array, goal: Array) -> float:
-        """[m] that no plan can cost less than, without the work on two runs (cost_bound.py)."""
+        """[s] that no plan can cost less than, without the work on two runs (cost_bound.py)."""
         if not self.scene.sides:
             return np.inf
         start, goal = (self.scene.item.mass_pose(pose) for pose in (start, goal))
@@ -160,7 +161,7 @@ class PushPlanner:
                 if search.solution is not None:
                     yield Progress(
                         "improving",
-                        self._assemble(search.solution, search.cost, ends[1], guide, work),
+                        self._assemble(search.solution, ends[1], guide, work),
                     )
                     return
                 if search.exhausted:
@@ -177,9 +178,7 @@ class PushPlanner:
         work.left -= search.expanded
         work.ways_in |= graph.arrivals > 0
         if search.solution is not None:
-            yield Progress(
-                "improving", self._assemble(search.solution, search.cost, ends[1], guide, work)
-            )
+            yield Progress("improving", self._assemble(search.solution, ends[1], guide, work))
 
     def _improved(
         self, best: PushPlan, ends: _Ends, guides: Guides, work: Work
@@ -196,6 +195,7 @@ class PushPlanner:
             if number == 0:
                 count, most = settings.improvement_poses, settings.improvement_expansions // 2
                 graph = self._graph(start, goal, guides.all()[-1], 1, count, 0, work)
+                bound = (1.0 - _WORTH) * self.scene.time.of_plan(best.segments, _HASTE)
             else:
                 most = work.left
                 between = [self.scene.item.mass_pose(s.object_end) for s in best.segments[:-1]]
@@ -209,8 +209,11 @@ class PushPlanner:
             for _ in search.run(work.statistics):
                 yield Progress(f"improving, round {number + 1}", best)
             work.left -= search.expanded
-            if search.solution is not None and search.cost < best.cost:
-                best = self._assemble(search.solution, search.cost, ends[1], best.guide, work)
+            if search.solution is None:
+                continue
+            found = self._assemble(search.solution, ends[1], best.guide, work)
+            if found.cost < best.cost:
+                best = found
                 yield Progress("improving", best)
         return best
 
@@ -219,7 +222,7 @@ class PushPlanner:
         found = gentler(
             self.scene, best.segments, best.cost, work.robot, work.random, work.statistics
         )
-        return best if found is None else self._assemble(*found, best.goal, best.guide, work)
+        return best if found is None else self._assemble(found, best.goal, best.guide, work)
 
     def _refusal(self, ends: _Ends, guides: Sequence[GuidePath], work: Work) -> PlanningFailed:
         widest = max(guide.clearance for guide in guides)
@@ -244,7 +247,7 @@ class PushPlanner:
         work.ways_out = work.ways_in = True
         if search.solution is None:
             raise self._refusal(ends, [guide], work)
-        return self._assemble(search.solution, search.cost, ends[1], guide, work)
+        return self._assemble(search.solution, ends[1], guide, work)
 
     def _graph(
         self,
@@ -272,7 +275,8 @@ class PushPlanner:
             candidates += manoeuvres(scene, goal, -1.0, guide.length, around, work.random)
         spacing = max(settings.waypoint_spacing, guide.length / most)
         reach = max(_REACH[0] * settings.waypoint_spacing, _REACH[1] * spacing)
-        return PushGraph(scene, start, goal, candidates.free(scene), reach, work.robot)
+        free = candidates.free(scene)
+        return PushGraph(scene, start, goal, free, reach, work.robot, _HASTE)
 
     def solve(self, start: Array, goal: Array, seed: int | None = None) -> PushPlan:
         """The final plan of ``plan``."""
@@ -326,12 +330,11 @@ class PushPlanner:
     def _assemble(
         self,
         steps: Sequence[PushStep],
-        cost: float,
         goal: Array,
         guide: GuidePath,
         work: Work,
     ) -> PushPlan:
         segments = tuple(self.segment(step) for step in steps)
-        clearance = min(s.clearance for s in segments)
+        clearance, cost = min(s.clearance for s in segments), self.scene.time.of_plan(segments)
         least, counted = min(work.least, cost), work.counted(guide)
         return PushPlan(goal, segments, cost, least, clearance, guide, counted)

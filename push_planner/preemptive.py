@@ -67,7 +67,7 @@ def preemptive_pushes(
                 if clearance is None or scene.object_clearance(after) < safe:
                     continue
                 gap = float(np.hypot(*(after - goal)[:2]))
-                step = PushStep(side, curve, start, after, clearance)
+                step = PushStep(side, curve, start, after, clearance, scene.time.of_push(curve))
                 found.append((gap, planner.segment(step)))
     found.sort(key=lambda pair: pair[0])
     return [segment for _, segment in found]
@@ -120,13 +120,9 @@ def plan_after_preemptive_push(
 
 
 def _preceded(planner: PushPlanner, first: PushSegment, plan: PushPlan, least: float) -> PushPlan:
-    """A plan with a push before it, at the cost that the search would give it. least: [m] bound of
+    """A plan with a push before it, at the cost that the search would give it. least: [s] bound of
     the cost of any plan."""
-    following = plan.segments[0]
-    cost = plan.cost + first.length + planner.settings.push_cost
-    if following.side != first.side:
-        way = float(np.hypot(*(following.robot_start - first.robot_end)[:2]))
-        cost += way + planner.settings.side_change_cost
     clearance = min(first.clearance, plan.clearance)
     segments = (first, *plan.segments)
+    cost = planner.scene.time.of_plan(segments)
     return replace(plan, segments=segments, cost=cost, cost_bound=least, clearance=clearance)

@@ -40,7 +40,7 @@ class PushStep:
 
     side: the pushed side. curve: path of the robot's axle midpoint. object_start, object_end:
     ``(3,)`` [m, m, rad] poses of the object's centre of mass, world frame. clearance: [m] of robot
-    and object to obstacles along the push.
+    and object to obstacles along the push. time: [s] that it takes, see ``plan_time.py``.
     """
 
     side: PushSide
@@ -48,6 +48,7 @@ class PushStep:
     object_start: Array
     object_end: Array
     clearance: float
+    time: float
 
 
 class PushGraph:
@@ -64,6 +65,7 @@ class PushGraph:
         candidates: Candidates,
         reach: float,
         robot: Array | None = None,
+        change_weight: float = 1.0,
     ) -> None:
         """Build the graph.
 
@@ -74,6 +76,7 @@ class PushGraph:
         candidates: poses of the object between start and goal.
         reach: [m] longest distance along Gamma that one push may cover.
         robot: ``(3,)`` pose of the robot before the first push; None if unknown.
+        change_weight: fraction of the time of a change of the side that counts.
         """
         self.scene = scene
         self._robot = robot
@@ -111,10 +114,11 @@ class PushGraph:
         self.chords = np.array(
             [shortest_chords(s.trusted.minimum, s.trusted.maximum) for s in scene.sides]
         )
-        settings = scene.settings
+        settings, time = scene.settings, scene.time
         widest = int((self.window[:, 1] - self.window[:, 0]).max())
         self._sight = np.zeros((*self.room.shape, widest), dtype=np.int8)
-        self._costs = (settings.push_cost, settings.side_change_cost)
+        self._changes = change_weight * time.changes
+        self._costs = (time.pace, time.begin, self._changes)
         keeps = np.array([self.leaving, settings.safety_distance])
         least = scene.shape.inradius + np.minimum(keeps, settings.safety_distance)
         self._view = (self.window, self._sight, least, scene.field.values, *scene.field.args)
@@ -122,9 +126,9 @@ class PushGraph:
         self._pushes: dict[tuple[int, int, int], PushStep | None] = {}
 
     def rough_costs(self, bound: float) -> tuple[Array, float]:
-        """Estimated cost [m] from the start to each state ``(n, sides)``, and of a whole plan [m].
+        """Estimated cost [s] from the start to each state ``(n, sides)``, and of a whole plan [s].
 
-        bound: [m] states whose estimate exceeds it are left out.
+        bound: [s] states whose estimate exceeds it are left out.
         """
         ready, arrived = rough_costs(
             self.poses,
@@ -187,7 +191,7 @@ class PushGraph:
         )
 
     def side_change(self, pose: int, before: int, after: int) -> float:
-        """Cost [m] of changing from one side to another at a pose; 0 if the side is the same.
+        """Cost [s] of changing from one side to another at a pose; 0 if the side is the same.
 
         before, after: numbers of the sides; -1 for ``after`` if no push follows.
         """
@@ -195,8 +199,7 @@ class PushGraph:
             return 0.0
         if not self._ways.get((pose, before, after), True):
             return math.inf
-        way = self.robots[before, pose, :2] - self.robots[after, pose, :2]
-        return float(np.hypot(*way)) + self.scene.settings.side_change_cost
+        return float(self._changes[before, after])
 
     def may_begin(self, side: int) -> bool:
         """Whether the robot can go from where it is to a side at the start, as far as is known."""
@@ -256,4 +259,5 @@ class PushGraph:
         clearance = self.scene.kept(curve, side, leaving)
         if clearance is None:
             return None
-        return PushStep(side, curve, self.poses[first], self.poses[last], clearance)
+        time = self.scene.time.of_push(curve)
+        return PushStep(side, curve, self.poses[first], self.poses[last], clearance, time)

@@ -45,7 +45,7 @@ class PlanStatistics:
 
 @dataclass(frozen=True)
 class PushPlan:
-    """cost [m]: g(q) of (2.10); cost_bound [m]: no plan costs less, see cost_bound.py; clearance
+    """cost [s]: g(q) of (2.10), see plan_time.py; cost_bound [s]: no plan costs less; clearance
     [m]; the guide path used.
 
     goal ``(3,)`` and the segments' poses are of the object's geometric frame, the guide path is of

@@ -31,7 +31,7 @@ _DETOURS = 20  # solutions of one search in which the robot cannot go from side 
 class SearchNode:
     """An object pose, with the side of the push that begins there.
 
-    pose: number of the pose in the graph. side: number of the side, -1 at the goal. cost: [m] from
+    pose: number of the pose in the graph. side: number of the side, -1 at the goal. cost: [s] from
     here to the goal, g of (2.10). parent: the node at which the push ends. step: that push.
     estimates, states: pushes that end at this node, from ``PushGraph.pushes_into``; None until the
     node is expanded. tried: how many of them have been taken.
@@ -51,10 +51,10 @@ class SearchNode:
 class PushSearch:
     """A search among the poses of a graph. ``run`` does the work in slices.
 
-    bound: [m] a solution must cost less. weight: factor (>= 1) of the estimated cost from the start
+    bound: [s] a solution must cost less. weight: factor (>= 1) of the estimated cost from the start
     to a push. expansions: number of pushes that may be tried. expanded: number that were tried.
     exhausted: whether all pushes that could be part of a solution were tried. solution: the pushes
-    in their order, None if none was found. cost: [m] of the solution.
+    in their order, None if none was found. cost: [s] of the solution.
     """
 
     graph: PushGraph
@@ -128,7 +128,7 @@ class PushSearch:
                 yield
             if step is None or (pose == 0 and not graph.may_begin(side)):
                 continue
-            cost = node.cost + step.curve.length + graph.scene.settings.push_cost
+            cost = node.cost + step.time
             cost += graph.side_change(node.pose, side, node.side)
             total = cost + self.weight * float(ready[pose, side])
             plain = cost + float(ready[pose, side])
@@ -146,10 +146,8 @@ class PushSearch:
         for side in range(len(graph.scene.sides)):
             if graph.worth_leaving_for(side, len(graph.poses) - 1) and graph.may_begin(side):
                 step = graph.push(0, len(graph.poses) - 1, side, statistics)
-                if step is not None:
-                    cost = step.curve.length + graph.scene.settings.push_cost
-                    if cost < self.bound:
-                        self.solution, self.cost, self.bound = (step,), cost, cost
+                if step is not None and step.time < self.bound:
+                    self.solution, self.cost, self.bound = (step,), step.time, step.time
 
 
 def _passable(graph: PushGraph, node: SearchNode) -> bool:

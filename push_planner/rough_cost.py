@@ -162,8 +162,9 @@ def rough_costs(
     room: Any,
     chords: Any,
     grasps: Any,
-    push_cost: float,
-    change_cost: float,
+    pace: float,
+    begin: float,
+    changes: Any,
     bound: float,
     window: Any,
     sight: Any,
@@ -173,7 +174,7 @@ def rough_costs(
     oy: float,
     scale: float,
 ) -> Any:
-    """Estimated cost [m] from the first pose to every state, by Dijkstra's algorithm.
+    """Estimated cost [s] from the first pose to every state, by Dijkstra's algorithm.
 
     All poses are in the world frame. The first pose is the start, the last one is the goal.
 
@@ -184,8 +185,9 @@ def rough_costs(
     room: ``(sides, n)`` whether the robot can reach this contact.
     chords: ``(sides, k, k)`` [m] tables of minimum chord lengths.
     grasps: ``(sides, 3)`` poses of the object in the robot frame.
-    push_cost, change_cost: [m] additional cost of each push, and of each change of side.
-    bound: [m] states are left out if their estimate plus their distance to the goal exceeds it.
+    pace: [s/m] of a push. begin: [s] that each push takes longer.
+    changes: ``(sides, sides)`` [s] of a change from one side to another, 0 on the diagonal.
+    bound: [s] states are left out if their estimate plus their distance to the goal exceeds it.
     window: ``(n, 2)`` for each pose, the range of poses (first, one past the last) to which it may
         be connected by a push.
     sight: ``(sides, n, widest window)`` int8, what is known about the pushes; all zeros at first.
@@ -221,13 +223,13 @@ def rough_costs(
                 continue
             dx, dy = robots[s, j, 0] - robots[s, i, 0], robots[s, j, 1] - robots[s, i, 1]
             straight = math.sqrt(dx * dx + dy * dy)
-            before = cost + push_cost
-            if before + straight >= min(arrived[j, s], bound - remaining[j]):
+            before = cost + begin
+            if before + pace * straight >= min(arrived[j, s], bound - pace * remaining[j]):
                 continue
             length = _guess(
                 i, j, s, robots, chords, grasps, window, sight, least, field, ox, oy, scale
             )
-            after = before + length
+            after = before + pace * length
             if after >= arrived[j, s]:
                 continue
             arrived[j, s] = after
@@ -235,11 +237,7 @@ def rough_costs(
                 continue
             for t in range(sides):
                 if room[t, j]:
-                    total = after
-                    if t != s:
-                        total += change_cost + math.hypot(
-                            robots[t, j, 0] - robots[s, j, 0], robots[t, j, 1] - robots[s, j, 1]
-                        )
+                    total = after + changes[s, t]
                     if total < ready[j, t]:
                         ready[j, t] = total
                         heapq.heappush(queue, (total, j * sides + t))
@@ -257,8 +255,9 @@ def pushes_into(
     room: Any,
     chords: Any,
     grasps: Any,
-    push_cost: float,
-    change_cost: float,
+    pace: float,
+    begin: float,
+    changes: Any,
     bound: float,
     window: Any,
     sight: Any,
@@ -275,15 +274,15 @@ def pushes_into(
     ----------
     j: number of the pose.
     following: side of the push that begins at pose j; -1 if there is none.
-    cost: [m] of the plan from pose j to the goal.
+    cost: [s] of the plan from pose j to the goal.
     weight: factor of the estimated cost from the start to the beginning of the push.
     least: [m] distances to obstacles, see ``rough_costs``.
-    ready: ``(n, sides)`` [m] from ``rough_costs``.
+    ready: ``(n, sides)`` [s] from ``rough_costs``.
     The other arguments are those of ``rough_costs``.
 
     Returns
     -------
-    estimates: ``(m,)`` [m] of the cost of the whole plan, with the weight.
+    estimates: ``(m,)`` [s] of the cost of the whole plan, with the weight.
     states: ``(m,)`` numbers ``i * sides + s`` of the pose i and the side s at which a push begins.
     Pushes whose estimate without the weight exceeds the bound are left out.
     """
@@ -294,20 +293,17 @@ def pushes_into(
     for s in range(sides):
         if not room[s, j]:
             continue
-        before = cost + push_cost
-        if following >= 0 and following != s:
-            before += change_cost + math.hypot(
-                robots[following, j, 0] - robots[s, j, 0],
-                robots[following, j, 1] - robots[s, j, 1],
-            )
+        before = cost + begin
+        if following >= 0:
+            before += changes[s, following]
         for i in range(window[j, 0], min(window[j, 1], n - 1)):
             if i == j or before + ready[i, s] >= bound or not window[i, 0] <= j < window[i, 1]:
                 continue
             length = _guess(
                 i, j, s, robots, chords, grasps, window, sight, least, field, ox, oy, scale
             )
-            if before + length + ready[i, s] < bound:
-                estimates[found] = before + length + weight * ready[i, s]
+            if before + pace * length + ready[i, s] < bound:
+                estimates[found] = before + pace * length + weight * ready[i, s]
                 states[found] = i * sides + s
                 found += 1
     order = np.argsort(estimates[:found])

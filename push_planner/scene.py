@@ -7,6 +7,7 @@ borders: mechanics works about it, and there are fewer frames to mix up.
 import copy
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ from push_model.stable_push import (
     curvature_limits,
 )
 from push_model.stick_certificate import ContactBelief, certified_limits, trusted_limits
+from push_planner.plan_time import PlanTime
 from push_planner.push_curve import PushCurve
 from push_planner.push_sweep import SWEEP_LOSS, push_clearance, rooms_behind
 from push_planner.settings import PlannerSettings
@@ -118,6 +120,15 @@ class PushScene:
         self._object_points = self.shape.dense_outline(_OUTLINE_SPACING)
         self._robot_points = densified(robot.outline, _OUTLINE_SPACING)
         self._robot_radius = float(np.hypot(*robot.outline.T).max())
+
+    @cached_property
+    def time(self) -> PlanTime:
+        """Times of pushes and of changes of the side."""
+        behind = {}
+        for side in self.sides:
+            back = np.array([-self.backs(side)[0], 0.0, 0.0])
+            behind[side.index] = se2.compose(se2.inverse(side.grasp), back)
+        return PlanTime(self.robot, self.settings, self.shape.outline, behind)
 
     def bending_less(self, part: float) -> "PushScene":
         """The same scene for plans that use only a part of the trusted curvatures."""

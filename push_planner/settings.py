@@ -110,15 +110,12 @@ class PlannerSettings:
         doc="Maximum number of boxes that are divided to raise the lower bound of the cost of the "
         "final plan",
     )
-    push_cost: float = bounded(
-        0.05, low=0.0, high=10.0, doc="Cost of each push in addition to its length (m)"
-    )
-    side_change_cost: float = bounded(
-        0.3,
+    contact_time: float = bounded(
+        2.5,
         low=0.0,
-        high=10.0,
-        doc="Cost of each change of the pushed side, in addition to the distance between the "
-        "robot poses (m)",
+        high=100.0,
+        doc="Time of each change of the pushed side for backing off and approaching, in addition "
+        "to the drive around the object (s)",
     )
     friction_trust: float = bounded(
         0.75,
@@ -136,7 +133,7 @@ class PlannerSettings:
         "friction_trust (dimensionless)",
     )
     easing: float = bounded(
-        0.04,
+        0.06,
         low=0.0,
         high=1.0,
         doc="Fraction by which the final plan may cost more than the cheapest one, if its pushes "

@@ -42,8 +42,8 @@ def poses_on(scene: PushScene, guide: GuidePath) -> Candidates:
 class ThesisSearch:
     """``run`` yields now and then, and ends with the first solution of Algorithm 1.
 
-    graph: of the poses on Gamma. expansions: how many pushes may be tried. solution, cost [m]:
-    what was found.
+    graph: of the poses on Gamma. expansions: how many pushes may be tried. solution, cost: what
+    was found, and its cost (2.10) [m] as printed.
     """
 
     graph: PushGraph

@@ -23,7 +23,7 @@ class PlannedPush:
 @dataclass(frozen=True)
 class Plan:
     """time: [s]. ways: name of a robot and its path ``(n, 2)`` [m]. continues: it is the next piece
-    of the plan before, which stays. cost, cost_bound: [m] of the plan, and what no plan costs less
+    of the plan before, which stays. cost, cost_bound: [s] of the plan, and what no plan costs less
     than; 0 if unknown."""
 
     time: float

@@ -76,7 +76,7 @@ def _results(contents: BagContents, errors: Mapping[str, tuple[float, float]]) -
         rows.append((space, job.system, crew, job.object, *error, pushes, cost, 100.0 * gap, end))
     heads = (
         *("team", "system", "robots", "object", "final error [mm]", "[rad]", "pushes"),
-        *("plan cost [m]", "above the best at most [%]", "end"),
+        *("plan cost [s]", "above the best at most [%]", "end"),
     )
     hits = contents.collisions
     touched = table(

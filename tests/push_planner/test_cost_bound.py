@@ -84,11 +84,10 @@ def open_scene(robot, item):
 
 
 def costs_of(scene, sides, lengths):
-    change = 0.0
-    for a, b in zip(sides, sides[1:], strict=False):
-        apart = se2.inverse(a.grasp)[:2] - se2.inverse(b.grasp)[:2]
-        change += float(np.hypot(*apart)) + scene.settings.side_change_cost
-    return sum(lengths) + len(lengths) * scene.settings.push_cost + change
+    at = {side.index: number for number, side in enumerate(scene.sides)}
+    time, numbers = scene.time, [at[side.index] for side in sides]
+    change = sum(time.changes[a, b] for a, b in zip(numbers, numbers[1:], strict=False))
+    return time.pace * sum(lengths) + len(lengths) * time.begin + change
 
 
 @pytest.mark.parametrize("com", [(0.0, 0.0), (0.01, 0.03)])
@@ -96,7 +95,7 @@ def test_no_random_plan_costs_less(robot, box, com):
     """One to four runs of random curvatures; the bound is not told what the plan costs."""
     random, scene = np.random.default_rng(3), open_scene(robot, replace(box, com=com))
     near = two = several = 0
-    for _ in range(150):
+    for _ in range(300):
         start = random.uniform([-1.0, -1.0, -np.pi], [1.0, 1.0, np.pi])
         pose, sides, lengths, corners = start, [], [], []
         scale = random.choice([0.03, 0.4])  # short runs cost little more than their changes
@@ -188,7 +187,7 @@ def test_it_is_near_the_best_plan_of_two_runs(robot, box):
         best = math.inf
         for a in scene.sides:
             begin = a.robot_pose(start)
-            single = dubins(begin, a.robot_pose(goal)) + scene.settings.push_cost
+            single = scene.time.pace * dubins(begin, a.robot_pose(goal)) + scene.time.begin
             best = min(best, single)
             for b in scene.sides:
                 if a is b:

@@ -36,9 +36,9 @@ def test_the_pre_emptive_push_is_the_first_of_the_plan():
         assert before.object_end == pytest.approx(after.object_start)
     settings, segments = planner.settings, plan.segments
     assert plan.length == pytest.approx(sum(s.length for s in segments))
-    assert plan.cost >= plan.length + len(segments) * settings.push_cost - 1e-9
+    assert plan.cost == pytest.approx(planner.scene.time.of_plan(segments))
     if segments[0].side != segments[1].side:
-        assert plan.cost >= plan.length + settings.side_change_cost
+        assert plan.cost >= plan.length / settings.push_speed + settings.contact_time
     assert plan.clearance == pytest.approx(min(s.clearance for s in segments))
     # the same object as long as the plan is the same: what is published is published once
     told = [r.best for r in reports if r.best is not None]

@@ -26,7 +26,9 @@ def push(planner, number, start, end, clearance=0.3):
     trusted = side.trusted
     curve = shortest_push_curve(start, end, trusted.minimum, trusted.maximum)
     at, to = (se2.compose(pose, side.grasp) for pose in (start, end))
-    return planner.segment(PushStep(side, curve, at, to, clearance))
+    return planner.segment(
+        PushStep(side, curve, at, to, clearance, planner.scene.time.of_push(curve))
+    )
 
 
 BEGIN, MIDDLE, END = np.array([[-1.0, 0.0, 0.0], [0.0, 0.2, 0.3], [1.0, 0.2, -0.4]])

@@ -37,9 +37,8 @@ def graph_of(scene, seed, count=24):
     )
 
 
-def cheapest(graph, length):
-    """Cost of the best plan, and of the way to every state, over explicit edges of a length."""
-    settings = graph.scene.settings
+def cheapest(graph, cost):
+    """Cost of the best plan, and of the way to every state, over explicit edges of a cost."""
     n, sides = len(graph.poses), len(graph.scene.sides)
     # node i * sides + s: ready at i to push on s; n * sides + the same: arrived at i on s
     rows, columns, weights = [], [], []
@@ -48,11 +47,11 @@ def cheapest(graph, length):
             if not graph.room[s, i]:
                 continue
             for j in range(1, n):
-                edge = length(i, j, s) if j != i and i != n - 1 and graph.room[s, j] else np.inf
+                edge = cost(i, j, s) if j != i and i != n - 1 and graph.room[s, j] else np.inf
                 if np.isfinite(edge):
                     rows.append(i * sides + s)
                     columns.append((n + j) * sides + s)
-                    weights.append(edge + settings.push_cost)
+                    weights.append(edge)
             for t in range(sides):
                 if graph.room[t, i] and i != 0:
                     rows.append((n + i) * sides + s)
@@ -88,7 +87,8 @@ def test_guessed_costs_are_those_of_dijkstra_on_the_explicit_graph(scene, seed):
             crossed = float(np.diff(way)[(rooms < least)[1:]].sum())
             if least - rooms.min() < 0.05:
                 part = min(part, crossed / 0.1)
-        return length + 0.6 * part if part < 1.0 else np.inf
+        time = scene.time
+        return time.begin + time.pace * (length + 0.6 * part) if part < 1.0 else np.inf
 
     best, states = cheapest(graph, guess)
     ready, estimate = graph.rough_costs(np.inf)
@@ -97,8 +97,9 @@ def test_guessed_costs_are_those_of_dijkstra_on_the_explicit_graph(scene, seed):
     # The planner's look along a cubic takes steps of 2 cm: it may miss or count a corner more.
     assert both.sum() > 0.9 * known.sum() and known.sum() > 15
     gap = np.abs(ready[1:-1][both] - states[1:-1][both])
-    assert np.median(gap) < 0.01 and np.quantile(gap, 0.9) < 0.3
-    assert estimate == pytest.approx(best, abs=0.3)
+    pace = scene.time.pace
+    assert np.median(gap) < 0.01 * pace and np.quantile(gap, 0.9) < 0.3 * pace
+    assert estimate == pytest.approx(best, abs=0.3 * pace)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 3])
@@ -111,11 +112,11 @@ def test_the_search_is_as_good_as_trying_every_push(scene, seed):
     other = graph_of(scene, seed)
     everything = SearchStatistics()
 
-    def length(i, j, s):
+    def cost(i, j, s):
         step = other.push(i, j, s, everything)
-        return np.inf if step is None else step.curve.length
+        return np.inf if step is None else step.time
 
-    best, _ = cheapest(other, length)
+    best, _ = cheapest(other, cost)
     if not np.isfinite(best):
         assert search.solution is None and search.exhausted
         return

@@ -1,0 +1,106 @@
+"""The cost (2.10) of a plan, as the time that it takes.
+
+The thesis adds lengths: of the pushes, and between the robot's places before and after a change of
+the side. Here each push takes the time for its curve at the greatest speed that wheels and settings
+allow, and the time to speed up and to brake. A change of the side takes the time of the robot's
+drive around the object in free space, and that of backing off and approaching.
+"""
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from push_model.arrays import Array
+from push_model.distance_field import DistanceField
+from push_model.occupancy import OccupancyGrid
+from push_model.push_segment import PushSegment
+from push_model.shapes import densified
+from push_model.specs import RobotSpec
+from push_planner.push_curve import PushCurve
+from push_planner.robot_path import OUTLINE_SLACK, NoRobotPath, plan_robot_path
+from push_planner.settings import PlannerSettings
+
+_SAMPLES = 65  # along a curve
+_SPACING = 0.01  # [m] of points on the outline that the robot drives around
+_CELL = 0.02  # [m] of the empty map on which it does
+
+
+class PlanTime:
+    """Times of pushes and of changes of the side.
+
+    pace: [s/m] of a straight push at full speed; no push takes less. begin: [s] that each push
+    takes longer because it begins and ends at rest. changes: ``(sides, sides)`` [s], 0 on the
+    diagonal.
+    """
+
+    def __init__(
+        self,
+        robot: RobotSpec,
+        settings: PlannerSettings,
+        outline: Array,
+        behind: Mapping[int, Array],
+    ) -> None:
+        """outline: ``(n, 2)`` [m] of the object. behind: ``(3,)`` pose of the robot, behind each
+        side and clear of it, in the frame of the outline, by the index of the side."""
+        drive = robot.differential
+        self._top, self._half = (1.0 - settings.wheel_reserve) * drive.max_speed, drive.half_track
+        self._speed = settings.push_speed
+        speed = min(self._speed, self._top)
+        self.pace, self.begin = 1.0 / speed, speed / settings.push_acceleration
+        corners = tuple((float(x), float(y)) for x, y in outline)
+        poses = tuple((float(x), float(y), float(t)) for x, y, t in behind.values())
+        self._numbers = {index: number for number, index in enumerate(behind)}
+        drives = np.array(_drives(robot, settings, corners, poses))
+        self.changes = drives + settings.contact_time * (1.0 - np.eye(len(poses)))
+
+    def of_push(self, curve: PushCurve) -> float:
+        """[s] of a push along a curve."""
+        points, _, curvature = curve.sample(_SAMPLES)
+        pace = np.maximum(1.0 / self._speed, (1.0 + self._half * np.abs(curvature)) / self._top)
+        parts = np.hypot(*np.diff(points, axis=0).T)
+        mean = float(parts @ (0.5 * (pace[1:] + pace[:-1])) / parts.sum())
+        return self.begin + curve.length * mean
+
+    def of_plan(self, segments: Sequence[PushSegment], change_weight: float = 1.0) -> float:
+        """[s] of pushes one after another: the cost of a plan.
+
+        change_weight: fraction of the time of a change of the side that counts.
+        """
+        total = 0.0
+        for s in segments:
+            total += self.of_push(
+                PushCurve(s.robot_start, s.robot_end, s.k_start, s.k_end, s.length)
+            )
+        for before, after in zip(segments, segments[1:], strict=False):
+            numbers = self._numbers[before.side], self._numbers[after.side]
+            total += change_weight * float(self.changes[numbers])
+        return total
+
+
+@lru_cache(maxsize=64)
+def _drives(
+    robot: RobotSpec,
+    settings: PlannerSettings,
+    corners: tuple[tuple[float, float], ...],
+    poses: tuple[tuple[float, float, float], ...],
+) -> tuple[tuple[float, ...], ...]:
+    """[s] from each pose to each other one, around the outline."""
+    points = densified(np.array(corners), _SPACING)
+    radius = robot.footprint_radius + OUTLINE_SLACK
+    circles = np.column_stack([points, np.full(len(points), radius)])
+    reach = float(np.abs(points).max() + np.abs(np.array(poses)[:, :2]).max()) + 6.0 * radius
+    cells = 2 * int(np.ceil(reach / _CELL))
+    empty = OccupancyGrid(np.zeros((cells, cells), dtype=bool), _CELL, np.array([-reach, -reach]))
+    field = DistanceField(empty)
+    result = np.zeros((len(poses), len(poses)))
+    for i, start in enumerate(poses):
+        for j in range(i):
+            begin, end = np.array(start), np.array(poses[j])
+            try:
+                way = plan_robot_path(field, robot, settings, begin, end, circles)
+                result[i, j] = result[j, i] = way.time[-1]
+            except NoRobotPath:  # out of a recess: straight
+                apart = float(np.hypot(*(end - begin)[:2]))
+                result[i, j] = result[j, i] = apart / settings.move_speed
+    return tuple(tuple(row) for row in result.tolist())
