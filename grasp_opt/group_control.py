@@ -30,6 +30,8 @@ from push_model.settings import bounded, settings
 
 _SQUARES = 1e-3  # weight of forces beside the wrench that they lack
 
+_SLANT = 0.2  # cosine of the greatest angle between a robot's way to the object and the normal
+
 
 @settings
 class GroupControlSettings:
@@ -218,13 +220,19 @@ class GroupController:
         """Velocities ``(n, 2)`` [m/s] by which robots come to an object at a pose ``(3,)`` along
         unit directions ``ahead (n, 2)`` in its frame.
 
-        A robot that already goes the way that it will push does not have to turn at the object.
+        A robot that already goes the way that it will push does not have to turn at the object. One
+        that would go along the outline goes towards it, too.
         """
         s = self.settings
         local = se2.transform(se2.inverse(pose), robots)
         way, away = self.outline.nearest(local)
         gaps = away - self._radius - self.offsets
-        slant = np.maximum(0.3, (self.outline.at(way).normals * ahead).sum(axis=1))
+        normals = self.outline.at(way).normals
+        across = np.column_stack([-normals[:, 1], normals[:, 0]])
+        along = (across * ahead).sum(axis=1)
+        slant = np.maximum(_SLANT, (normals * ahead).sum(axis=1))
+        along = np.copysign(np.sqrt(np.maximum(0.0, 1.0 - slant**2)), along)
+        ahead = slant[:, None] * normals + along[:, None] * across
         speed = np.clip(s.gap_gain * gaps / slant, -s.approach, s.approach)
         velocities: Array = (speed[:, None] * ahead) @ se2.rotation_matrix(float(pose[2])).T
         return velocities

@@ -133,6 +133,20 @@ def test_robots_come_to_the_object_the_way_that_they_will_push():
     assert (speeds > 0.005).all() and (speeds <= group.settings.approach + 1e-9).all()
 
 
+def test_a_robot_that_will_push_along_the_outline_comes_to_the_object_all_the_same():
+    """Object turning about a point behind a contact: the robot there moves along the outline."""
+    group = controller((math.pi - 0.8, math.pi, math.pi + 0.8))
+    pose, settings = np.array([0.4, -0.3, 2.0]), group.settings
+    inward = group.outline.at(group.ways).normals
+    for slant in (-0.2, 0.0, 0.1, 0.5, 1.0):
+        across = np.column_stack([-inward[:, 1], inward[:, 0]])
+        ahead = slant * inward + math.sqrt(1.0 - slant**2) * across
+        robots = se2.transform(pose, group.places - 0.0015 * inward)
+        velocities = group.meet(pose, ahead, robots)
+        gaps, closing = group.closing(pose, robots, velocities)
+        assert closing == pytest.approx(settings.gap_gain * gaps, rel=0.05), slant
+
+
 def test_robots_that_come_too_close_part_again_and_others_do_not_care():
     group = controller((math.pi - 0.3, math.pi, math.pi + 0.9))
     twist = np.array([0.05, 0.0, 0.0])
