@@ -223,8 +223,8 @@ def test_other_files_are_refused(tmp_path, text):
         read_values(file)
 
 
-def summary(seeds):
-    cases = [calibrated(seed) for seed in seeds]
+def summary(seeds, **rig):
+    cases = [calibrated(seed, **rig) for seed in seeds]
     for seed, case in zip(seeds, cases, strict=True):
         print(seed, case.floor, case.contact, f"{1e3 * case.distance_error:.3f} mm", case.found)
     for case in cases:
@@ -237,6 +237,18 @@ def test_random_objects_are_calibrated():
     """A slice of the study below."""
     floor, contact = summary(range(4))
     assert floor >= 3 and contact >= 3
+
+
+def test_missing_poses_cost_pushes_and_not_the_truth():
+    """No poses for 0.38 s, every 2 s in the mean: a hole at the release of 1 push in 6."""
+    floor, contact = summary(range(4), holes=(2.0, 0.38))
+    assert floor >= 3 and contact >= 3
+
+
+@pytest.mark.study
+def test_sixty_random_objects_are_calibrated_with_missing_poses():
+    floor, contact = summary(range(60), holes=(2.0, 0.38))
+    assert floor >= 54 and contact >= 54
 
 
 @pytest.mark.study
