@@ -145,6 +145,7 @@ def far(a, b):
 def test_single_by_everything_that_the_page_offers(page):
     page.start("single", "short")
     begun = page.shown_pose("box")
+    assert page.touch != ("Escape" in page.text("hint"))
     # a goal by drag, planned first, then carried out
     page.click("preview")
     page.drag_goal(0.1, 0.04, 0.1)
@@ -208,7 +209,15 @@ def displace(page, item):
 
 
 def send_and_cancel(page, x, y):
+    """Cancel is in sight, wherever the page is scrolled to."""
     page.send(x, y, 0.0)
+    for place in ("0", "document.body.scrollHeight"):
+        page.value(f"scrollTo(0, {place})")
+        top, bottom, height = page.value(
+            "(r => [r.top, r.bottom, innerHeight])"
+            "(document.getElementById('cancel').getBoundingClientRect())"
+        )
+        assert 0.0 <= top and bottom <= height
     page.click("cancel")
     page.until("document.getElementById('state').textContent === 'IDLE'")
 
