@@ -217,7 +217,7 @@ def send_and_cancel(page, x, y):
             "(r => [r.top, r.bottom, innerHeight])"
             "(document.getElementById('cancel').getBoundingClientRect())"
         )
-        assert 0.0 <= top and bottom <= height
+        assert top >= 0.0 and bottom <= height
     page.click("cancel")
     page.until("document.getElementById('state').textContent === 'IDLE'")
 
