@@ -1,5 +1,5 @@
-"""A robot and an object of a lab as the ``Rig`` of a calibration. It stops where poses are lost, or
-where the robot comes too near to the edge of the map."""
+"""A robot and an object of a lab as the ``Rig`` of a calibration. It stops while poses are lost,
+and for good where they stay away or where the robot comes too near to the edge of the map."""
 
 import time
 
@@ -11,7 +11,10 @@ from lab_bridge.observation import Observer
 from push_estimation.tracks import Track
 from push_model.arrays import Array
 
-_LOST = 0.4  # [s] without a pose
+_LOST = 0.4  # [s] without a pose, after which the robot stops
+_AWAY = 5.0  # [s] more without a pose, after which the calibration ends
+_BACK = 0.2  # [s] during which poses have to come again
+_KEPT = 1.0  # [s] of poses from before a run
 _PAIR = 0.006  # [s] between the stamps of two poses of one frame
 _EDGE = 0.1  # [m] of the robot's middle from the edge of the map
 
@@ -55,38 +58,57 @@ class LabRig:
         raise RigFailed(why)
 
     def run(self, v: float, omega: float, seconds: float) -> Track:
-        """See Rig."""
-        observer = self._observer
-        observer.samples.clear()
+        """See Rig. Where poses are lost, the robot stops, and the run ends when they are back."""
+        observer, begun = self._observer, time.time()
+        observer.samples[:] = [s for s in observer.samples if begun - s.arrived < _KEPT]
         observer.command(self._robot, v, omega)
-        kept: list[Sample] = []
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             observer.poll()
-            self._watch()
-        kept = list(observer.samples)
-        return self._track(kept)
+            self._check()
+            if self._unseen(_LOST):
+                self._wait_for_poses()
+                break
+        return self._track([s for s in observer.samples if s.arrived >= begun])
 
-    def _watch(self) -> None:
+    def _newest(self, body: str) -> Sample | None:
+        marker = self._mapping.markers[body]
+        return next((s for s in reversed(self._observer.samples) if s.marker == marker), None)
+
+    def _unseen(self, limit: float) -> str:
+        """A body of which no pose has arrived for limit [s]; empty where there is none."""
+        for body in (self._robot, self._item):
+            newest = self._newest(body)
+            if newest is None or time.time() - newest.arrived > limit:
+                return body
+        return ""
+
+    def _wait_for_poses(self) -> None:
+        observer = self._observer
+        observer.command(self._robot, 0.0, 0.0)
+        now = seen = time.monotonic()
+        limit = now + _AWAY
+        while now - seen < _BACK:
+            observer.poll()
+            self._check()
+            now = time.monotonic()
+            body = self._unseen(_BACK / 2.0)
+            if body:
+                seen = now
+            if body and now > limit:
+                self._fail(f"no poses of '{body}' arrive")
+
+    def _check(self) -> None:
+        """Fail where the robot cannot be commanded, or is about to leave the map."""
         trouble = self._observer.robots[self._robot].trouble
         if trouble:
             self._fail(f"{self._robot}: {trouble}")
-        samples = self._observer.samples
-        if not samples:
-            return
-        for body in (self._robot, self._item):
-            marker = self._mapping.markers[body]
-            newest = next((s for s in reversed(samples) if s.marker == marker), None)
-            first = samples[0].arrived
-            if time.time() - (first if newest is None else newest.arrived) > _LOST:
-                self._fail(f"no poses of '{body}' arrive")
-            if newest is None or body != self._robot:
-                continue
-            placed = self._mapping.place(body, newest.seen)
-            if placed is not None:
-                inside = (self._low <= placed.pose[:2]) & (placed.pose[:2] <= self._high)
-                if not inside.all():
-                    self._fail(f"'{body}' is at the edge of the map; more free floor is needed")
+        newest = self._newest(self._robot)
+        placed = None if newest is None else self._mapping.place(self._robot, newest.seen)
+        if placed is not None:
+            inside = (self._low <= placed.pose[:2]) & (placed.pose[:2] <= self._high)
+            if not inside.all():
+                self._fail(f"'{self._robot}' is at the edge of the map; more free floor is needed")
 
     def _track(self, samples: list[Sample]) -> Track:
         """Frames that show robot and object."""

@@ -24,6 +24,7 @@ from push_ros.qos import COMMAND, LATCHED, STREAM
 
 Pose = tuple[float, float, float]
 _PROGRESS = 2.0  # [s] wall time between events that tell the distance
+_MOVED = 1e-3  # [m] of the object since the distance was told, to tell it again
 _LOOK = 0.2  # [s] wall time between two looks at the graph
 _SAME = 1e-6  # [m], [rad] goals that are the same
 
@@ -57,6 +58,7 @@ class Monitor:
         self._began = False
         self._job = 0  # number of the job that pursues the goal sent; of the one before, until then
         self._begin = self._told = self._looked = 0.0
+        self._gap: float | None = None  # [m] the distance that was told last
         self._owner = OwnerWatch(frozenset())
         self._missed = self._restarted = False
 
@@ -140,7 +142,7 @@ class Monitor:
         self._news, self._began, self._restarted = [], False, False
         self._job = 0 if self.state is None else int(self.state.job)
         self._owner = OwnerWatch(self._owners())
-        self._begin, self._told = self.stamp, time.monotonic()
+        self._begin, self._told, self._gap = self.stamp, time.monotonic(), None
         # its stamp tells it from the goals of others
         self._sent = pose_stamped_to_ros(np.array(self._goal), time.time())
         self._publisher.publish(self._sent)
@@ -187,7 +189,7 @@ class Monitor:
             if result is not None:
                 return result
         if time.monotonic() - self._told > _PROGRESS and self.state is not None:
-            self._tell("progress")
+            self._tell_progress()
         return None
 
     def _owners(self) -> frozenset[bytes]:
@@ -235,6 +237,14 @@ class Monitor:
         position, orientation = errors_of(self._goal, self.pose)
         duration = self.stamp - self._begin
         return JobResult(code, reason, self._goal, position, orientation, duration, team=self.team)
+
+    def _tell_progress(self) -> None:
+        """Tell the distance, unless it is still what was told: robots may only walk."""
+        assert self._goal is not None
+        gap = None if self.pose is None else errors_of(self._goal, self.pose)[0]
+        if gap is not None and (self._gap is None or abs(gap - self._gap) >= _MOVED):
+            self._gap = gap
+            self._tell("progress")
 
     def _tell(self, kind: str, why: str = "") -> None:
         assert self._goal is not None and (self.state is not None)

@@ -54,13 +54,12 @@ def bumper_distance(pushes: list[Track], outline: Array) -> Interval:
     """
     trials = []
     for push in pushes:
-        step = np.hypot(*np.diff(push.item[:, :2], axis=0).T) if len(push.time) > 1 else np.zeros(0)
-        if len(step) < 2 * _WINDOW:
+        if len(push.time) < 3 * _WINDOW:
             continue
-        speed = np.convolve(step, np.ones(_WINDOW), "same") / (
-            _WINDOW * float(np.diff(push.time).mean())
-        )
-        moving = np.flatnonzero(speed > _MOVES)
+        # over a window, or noise would be taken for motion; poses may be missing in it
+        step = push.item[_WINDOW:, :2] - push.item[:-_WINDOW, :2]
+        speed = np.hypot(*step.T) / (push.time[_WINDOW:] - push.time[:-_WINDOW])
+        moving = np.flatnonzero(speed > _MOVES) + _WINDOW // 2
         if len(moving) < 2 * _WINDOW:
             continue
         chosen = moving[len(moving) // 2 : -_WINDOW // 2]  # it has settled on the bumper by then

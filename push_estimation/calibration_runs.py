@@ -31,6 +31,7 @@ _BACK = 0.05  # [m/s] of the way back
 _STEP = 0.05  # [s] of the control of the way back
 _PATIENCE = 40.0  # [s] for a way back
 _TIGHTEST = 12.0  # [1/m]
+_TURNS = 3  # until one of them is seen well enough
 
 
 class Rig(Protocol):
@@ -49,7 +50,8 @@ class Rig(Protocol):
     def run(self, v: float, omega: float, seconds: float) -> Track:
         """Drive with a twist [m/s, rad/s] for some time [s]; what was seen meanwhile.
 
-        The robot goes on with that twist until the next call.
+        The robot goes on with that twist until the next call. A run during which poses are lost may
+        be shorter, and the robot stands after it.
         """
         ...
 
@@ -111,7 +113,7 @@ class Runs:
         self._rig.run(0.0, 0.0, 0.3)
         drive = self._rig.run(_DRIVE, 0.0, 1.5)
         self._rig.run(0.0, 0.0, 0.3)
-        settled = drive.between(float(drive.time[0]) + 0.3, float(drive.time[-1]))
+        settled = drive if not len(drive.time) else drive.between(drive.time[0] + 0.3, math.inf)
         x, y = axle_in_marker_frame(turn.robot)
         yaw = heading_in_marker_frame(settled.time, settled.robot)
         self._frame = np.array([x.value, y.value, yaw])
@@ -166,7 +168,7 @@ class Runs:
         self._rig.run(0.0, 0.0, 0.3)
 
     def straight(self, face: Array) -> tuple[Track, float]:
-        """A straight push that ends at once; the time [s] of its end."""
+        """A straight push that ends at once; the time [s] of its end, -inf if it was not seen."""
         self._tell("a straight push")
         self.go_behind(face)
         seconds = _GAP / self._plan.speed + 0.75
@@ -177,7 +179,7 @@ class Runs:
             np.vstack([push.robot, rest.robot]),
             np.vstack([push.item, rest.item]),
         )
-        return whole.corrected(self._frame), float(push.time[-1])
+        return whole.corrected(self._frame), float(push.time[-1]) if len(push.time) else -math.inf
 
     def curve(self, face: Array, curvature: float) -> Track:
         """A push into a curve [1/m] during which the object should slide.
@@ -222,10 +224,13 @@ class Runs:
         """All runs; what cannot be found is named, and the rest goes on."""
         plan, troubles = self._plan, list[str]()
         axle: tuple[Interval, Interval] | None = None
-        try:
-            _, axle = self.marker()
-        except TooLittle as error:
-            troubles.append(f"marker frame: {error}")
+        for k in range(_TURNS):
+            try:
+                _, axle = self.marker()
+                break
+            except TooLittle as error:
+                if k == _TURNS - 1:
+                    troubles.append(f"marker frame: {error}")
         face = self.face()
         pushes = [self.straight(face) for _ in range(plan.straight)]
         distance, floor, contact = None, None, None

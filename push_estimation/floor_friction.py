@@ -18,6 +18,8 @@ from push_model.limit_surface import GRAVITY
 _LINE = 0.5  # [s] of the push before the release that give its speed
 _CLEAR = 0.03  # [s] about the release that belong to neither line nor rest
 _SLIDE = 0.25  # [s] until the object rests at the latest
+_SEEN = (-0.03, 0.1)  # [s] about the release, in which no poses may be missing
+_HOLE = 0.04  # [s] between two poses
 _LEAST, _MOST = 0.03, 1.5  # of mu
 _SHARED = 0.02  # of mu: the time in which the robot stops
 
@@ -27,12 +29,15 @@ def slide(push: Track, release: float) -> float:
 
     Raises
     ------
-    TooLittle: too few poses, or the object did not move.
+    TooLittle: too few poses, none of the slide, or the object did not move.
     """
     t = push.time - release
     line, rest = (t > -_LINE) & (t < -_CLEAR), t > _SLIDE
     if line.sum() < 10 or rest.sum() < 5:
         raise TooLittle("too few poses before or after the release")
+    over = (t[1:] > _SEEN[0]) & (t[:-1] < _SEEN[1])  # steps of time that touch the slide
+    if np.diff(t)[over].max() > _HOLE:
+        raise TooLittle("poses are missing at the release")
     rows = np.column_stack([np.ones(int(line.sum())), t[line]])
     solved, *_ = np.linalg.lstsq(rows, push.item[line, :2], rcond=None)
     speed = float(np.hypot(*solved[1]))

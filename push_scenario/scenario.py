@@ -174,13 +174,21 @@ class Scenario:
         return Team("", tuple(self.robots), item, self.goals, self.trajectory)
 
     def settings(self, node: str, **changes: Any) -> "Scenario":
-        """The scenario with some settings of a node replaced; a key may be dotted with ``__``."""
+        """The scenario with some settings of a node replaced; a key may be dotted with ``__``.
+
+        Raises
+        ------
+        SettingsError: a part of a key is not a section but a value.
+        """
         values = _copied(self.parameters.get(node, {}))
         for key, value in changes.items():
             *path, last = key.split("__")
             inner = values
             for part in path:
                 inner = inner.setdefault(part, {})
+                if not isinstance(inner, dict):
+                    dotted = ".".join((node, *path, last))
+                    raise SettingsError(f"{dotted}: '{part}' has the value {inner!r}, no settings")
             inner[last] = value
         return replace(self, parameters={**self.parameters, node: values})
 

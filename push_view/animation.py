@@ -32,7 +32,7 @@ def write_animation(contents: BagContents, path: Path, frames: int = 90) -> None
     figure = Figure(figsize=(6, 4.2), dpi=80)
     canvas: Any = FigureCanvasAgg(figure)
     axes = figure.add_subplot()
-    draw_map(axes, contents.scenario.grid)
+    draw_map(axes, contents.scenario)
     draw_jobs(axes, bodies, contents.jobs.values())
     canvas.draw()
     still = canvas.copy_from_bbox(figure.bbox)

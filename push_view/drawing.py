@@ -6,30 +6,45 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.patches import Polygon
+from matplotlib.colors import ListedColormap
+from matplotlib.patches import Circle, Polygon, Rectangle
 
 from push_model import se2
 from push_model.arrays import Array
-from push_model.occupancy import OccupancyGrid
 from push_record.contents import BagContents, Job
+from push_scenario.scenario import Scenario
 from push_view.bodies import Bodies, bodies_of
-from push_view.palette import GOAL, robot_colour
+from push_view.page_data import obstacles_json
+from push_view.palette import GOAL, OBSTACLE, robot_colour
 
 _NAMED = 6  # number of bodies up to which each is named in the legend
 _WAY_POINTS = 2000  # number of points with which a path is drawn
 
 
-def draw_map(axes: Axes, grid: OccupancyGrid) -> None:
-    """Draw the occupancy grid, axes in [m]."""
-    axes.imshow(
-        np.where(grid.occupied, 0.25, 1.0),
-        origin="lower",
-        extent=grid.extent,
-        cmap="gray",
-        vmin=0.0,
-        vmax=1.0,
-        interpolation="nearest",
-    )
+def draw_map(axes: Axes, scenario: Scenario) -> None:
+    """Draw obstacles and walls: the shapes that they are, or the cells of a map; axes in [m]."""
+    known = obstacles_json(scenario.environment)
+    x0, x1, y0, y1 = scenario.grid.extent
+    if known is None:
+        axes.imshow(
+            np.ma.masked_equal(scenario.grid.occupied, False),
+            origin="lower",
+            extent=(x0, x1, y0, y1),
+            cmap=ListedColormap([OBSTACLE]),
+            interpolation="nearest",
+        )
+    else:
+        width, height = known["size"]
+        walls = Rectangle((-width / 2, -height / 2), width, height, fill=False)
+        walls.set(edgecolor=OBSTACLE, linewidth=2.5)
+        axes.add_patch(walls)
+        for shape in known["shapes"]:
+            points = shape.get("points")
+            patch = Circle(shape["centre"], shape["radius"]) if points is None else Polygon(points)
+            patch.set(facecolor=OBSTACLE, edgecolor="none")
+            axes.add_patch(patch)
+    axes.set_xlim(x0, x1)
+    axes.set_ylim(y0, y1)
     axes.set_aspect("equal")
     axes.set_xlabel("x [m]")
     axes.set_ylabel("y [m]")
@@ -97,14 +112,14 @@ def moments(count: int, bodies: int) -> Array:
 
 
 def draw_jobs(axes: Axes, bodies: Bodies, jobs: Iterable[Job]) -> None:
-    """Plans and goals of some teams."""
+    """Plans and goals of some teams; plans lie over the paths of bodies."""
     planned: set[str] = set()
     aimed = False
     for job in jobs:
         for push in job.pushes:
             colour, label = robot_colour(push.number), push.name
             shown = None if label in planned else label
-            axes.plot(*push.path.T, color=colour, lw=1.0, ls="--", label=shown)
+            axes.plot(*push.path.T, color=colour, lw=1.2, ls="--", label=shown, zorder=2.6)
             planned.add(label)
         if job.goal is not None and job.object in bodies.names:
             outline = bodies.type(job.object).outline
@@ -116,15 +131,13 @@ def draw_jobs(axes: Axes, bodies: Bodies, jobs: Iterable[Job]) -> None:
 def draw_trajectory(axes: Axes, contents: BagContents, jobs: Iterable[Job] | None = None) -> None:
     """Map, plans and goals of teams, paths of all bodies, and the bodies at a few times."""
     bodies = bodies_of(contents.scenario)
-    draw_map(axes, contents.scenario.grid)
+    draw_map(axes, contents.scenario)
     draw_jobs(axes, bodies, contents.jobs.values() if jobs is None else jobs)
     draw_ways(axes, bodies, contents.poses)
     alpha = 0.35 if len(contents.poses) <= _NAMED else 0.6
     for moment in moments(len(contents.time), len(contents.poses)):
         vertices = body_vertices(bodies, contents.poses, int(moment))
         draw_bodies(axes, vertices, alpha=alpha, linewidths=0.8)
-    x0, x1, y0, y1 = contents.scenario.grid.extent
-    axes.set_xlim(x0, x1)
-    axes.set_ylim(y0, y1)
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend(loc="upper left", fontsize=7, framealpha=0.9)
+    if axes.get_legend_handles_labels()[0]:  # below the map, so that it covers nothing
+        below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.11), "frameon": False}
+        axes.legend(**below, fontsize=7, ncols=5)

@@ -20,6 +20,7 @@ ROBOTS = (
 """One robot after another; also sides of an object, and teams."""
 
 OBJECT, GOAL, PLAN, INK = "#8a6a4a", "#c22f3d", "#777777", "#222222"
+OBSTACLE = "#6e6e6e"
 
 EACH = 50
 """Number of robots up to which each has a colour of its own."""

@@ -131,7 +131,7 @@ def _first_page(
     pdf: Any, contents: BagContents, jobs: list[Job], errors: dict[str, FinalError]
 ) -> None:
     page = plt.figure(figsize=_PAGE)
-    layout = page.add_gridspec(2, 1, height_ratios=[1.3, 1.0], hspace=0.12)
+    layout = page.add_gridspec(2, 1, height_ratios=[1.3, 1.0], hspace=0.25)
     draw_trajectory(page.add_subplot(layout[0]), contents)
     words = page.add_subplot(layout[1])
     words.axis("off")
@@ -147,7 +147,7 @@ def _first_page(
 def _team_page(pdf: Any, contents: BagContents, job: Job, heading: str) -> None:
     """The map with the team's plan and goal, and its reports below."""
     page = plt.figure(figsize=_PAGE)
-    layout = page.add_gridspec(2, 1, height_ratios=[1.0, 1.35], hspace=0.16)
+    layout = page.add_gridspec(2, 1, height_ratios=[1.0, 1.35], hspace=0.28)
     draw_trajectory(page.add_subplot(layout[0]), contents, [job])
     draw_report(page, layout[1], contents, job)
     page.suptitle(heading, fontsize=9)

@@ -104,8 +104,8 @@ def draw_report(figure: Any, grid: Any, contents: "BagContents", job: "Job") -> 
         return
     charts = _charts(drawn)
     moments = [m for s in drawn for m in s.moments if m[1].shapes]
-    rows = len(charts) + bool(moments)
-    heights = [1.0] * len(charts) + [2.4] * bool(moments)
+    heights = [1.0] * len(charts) + [0.3, 2.4] * bool(moments)  # 0.3: titles and labels of time
+    rows = len(heights)
     inner = grid.subgridspec(rows, _SHOWN, hspace=0.35, height_ratios=heights)
     for row, (unit, lines) in enumerate(charts.items()):
         axes = figure.add_subplot(inner[row, :])

@@ -28,6 +28,7 @@ from push_view.page_data import plan_json
 from push_view.report_panel import LivePanel
 
 _LOG = 60  # states kept
+_BACK = 0.5  # [s] by which time goes back where a run begins anew
 
 
 def stamp_text(message: PoseStamped) -> str:
@@ -120,7 +121,15 @@ class TeamView:
     def _put(self, kind: str, **data: Any) -> None:
         self._board.put(f"{kind} {self.space}", kind, {"space": self.space, **data})
 
+    def _forget(self) -> None:
+        """What was of the run before: its states, its plan, its figures."""
+        self._log, self._plans, self._of = [], [], ("", ())
+        self._put_plan()
+
     def _on_state(self, message: JobState) -> None:
+        moment = round(time_from_ros(message.header.stamp), 1)
+        if self._log and moment < self._log[-1][0] - _BACK:
+            self._forget()
         goal = None
         if message.goal.header.frame_id:
             with contextlib.suppress(InvalidMessage):
@@ -146,7 +155,7 @@ class TeamView:
             refusal=message.refusal,
             refused_stamp=stamp_text(message.refused_goal),
         )
-        entry = [round(time_from_ros(message.header.stamp), 1), message.state_name, message.reason]
+        entry = [moment, message.state_name, message.reason]
         if not self._log or self._log[-1][1:] != entry[1:]:
             self._log.append(entry)
             del self._log[:-_LOG]

@@ -90,10 +90,18 @@ def film(bag: Path, picture: Path) -> None:
         for k in range(FRAMES):
             seek(browser, k / (FRAMES - 1))
             frames.append(scene(browser))
-        colours = frames[-1].quantize(96)
+        colours = palette([frames[0], frames[FRAMES // 2], frames[-1]])
         images = [f.quantize(palette=colours, dither=Image.Dither.NONE) for f in frames]
         durations = [80] * (FRAMES - 1) + [2000]
         images[0].save(picture, save_all=True, append_images=images[1:], duration=durations, loop=0)
+
+
+def palette(frames: list[Image.Image]) -> Image.Image:
+    """Colours of some frames; thin lines have theirs, too, however few their pixels are."""
+    strip = Image.new("RGB", (frames[0].width, sum(f.height for f in frames)))
+    for k, frame in enumerate(frames):
+        strip.paste(frame, (0, k * frame.height))
+    return strip.quantize(96, method=Image.Quantize.MAXCOVERAGE)
 
 
 def scene(browser: Browser) -> Image.Image:

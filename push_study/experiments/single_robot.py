@@ -173,7 +173,7 @@ def _print_times(rows: list[Row], scenarios: list[str]) -> None:
 def _plot(name: str, rows: list[Row], traces: list[Path], out: Path) -> None:
     scenario = load_scenario(name)
     figure, axes = plt.subplots(figsize=(9, 6))
-    draw_map(axes, scenario.grid)
+    draw_map(axes, scenario)
     outline = bodies_of(scenario).type(next(iter(scenario.objects))).outline
     good_seeds = {r["seed"] for r in rows if r["success"]}
     for path in traces:

@@ -10,6 +10,7 @@ import {ask, get, listen} from "./server.js";
 import {showBelief, showSide, showTeams} from "./side.js";
 
 const CHARTS = 500;   // [ms] between two drawings of the charts
+const fingers = matchMedia("(pointer: coarse)").matches;   // there is no mouse
 const at = id => document.getElementById(id);
 const model = emptyModel(), scene = new Scene(at("scene"));
 let chosen = "", drag = null, sent = null, dirty = false, mapNumber = 0, refused = "";
@@ -54,9 +55,10 @@ function showControls(why) {
   for (const button of document.querySelectorAll("#typed button")) {
     button.disabled = button.value === "put" ? !offered("displace") : Boolean(why);
   }
-  const hints = {goal: "press at the goal and drag in the direction that the object should face; Escape cancels",
-    move: "drag a body to another place", kill: "click a robot: it obeys no more, until a reset",
-    pan: "drag to move the map, turn the wheel to zoom"};
+  const hints = {goal: "press at the goal and drag in the direction that the object should face; "
+      + (fingers ? "a second finger cancels" : "Escape cancels"),
+    move: "drag a body to another place", kill: `${fingers ? "touch" : "click"} a robot: it obeys no more, until a reset`,
+    pan: `drag to move the map, ${fingers ? "two fingers zoom" : "turn the wheel to zoom"}`};
   at("hint").textContent = why && tool() === "goal" ? "no goal can be sent now" : hints[tool()];
 }
 

@@ -69,6 +69,7 @@ const takers = {
   poses: takePoses,
   belief: (model, data) => { model.belief = data.rows; },
   bodies: (model, data) => {
+    if (data.revision !== model.bodies?.revision) for (const team of model.teams.values()) team.series.clear();
     model.bodies = data; model.poses = null; model.time = null; model.trails.clear();
     model.index = new Map(data.names.map((name, i) => [name, i]));
     for (const team of model.teams.values()) takeMembers(model, team);

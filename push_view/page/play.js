@@ -103,7 +103,9 @@ export async function begin({bags = [], data = null}) {
     return;
   }
   at("title").textContent = recordings.map(r => r.name).join(" | ");
-  at("hint").textContent = "drag to move the map, turn the wheel to zoom; space plays, arrows step; click a chart or the log to jump";
+  at("hint").textContent = matchMedia("(pointer: coarse)").matches
+    ? "drag to move the map, two fingers zoom; touch a chart or the log to jump"
+    : "drag to move the map, turn the wheel to zoom; space plays, arrows step; click a chart or the log to jump";
   charts = new Charts(at("charts"), seek);
   makeViews(); makeTimeline(); makeChoice();
   for (const link of document.querySelectorAll("[data-time]")) {

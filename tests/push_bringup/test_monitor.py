@@ -182,3 +182,17 @@ def test_when_the_world_is_gone_as_well_the_nodes_have_ended(world, monkeypatch)
             source.destroy_publisher(publisher)
     result = polled(monitor)
     assert result.code is None and "the nodes have ended before the job" in result.reason
+
+
+def test_a_distance_is_told_once_while_the_object_stands(world, monkeypatch):
+    monkeypatch.setattr("push_bringup.monitor._PROGRESS", 0.0)
+    monitor, events, _, source = world
+    poses = source.create_publisher(Poses, "/poses", STREAM)
+    assert monitor.wait(15.0, lambda: poses.get_subscription_count() > 0)
+    for x in (0.0, 0.0, 0.1, 0.1, 0.1004, 0.102):
+        poses.publish(poses_to_ros({"box": np.array([x, 0.0, 0.0])}, 2.0))
+        assert monitor.wait(15.0, lambda x=x: monitor.pose is not None and monitor.pose[0] == x)
+        for _ in range(3):
+            assert monitor.poll() is None
+    told = [e.distance for e in events if e.kind == "progress"]
+    assert told == pytest.approx([float(np.hypot(0.4 - x, 0.1)) for x in (0.0, 0.1, 0.102)])

@@ -45,9 +45,9 @@ def holds(interval, truth):
     return interval is not None and interval.low <= truth <= interval.high
 
 
-def calibrated(seed: int) -> Case:
+def calibrated(seed: int, holes: tuple[float, float] = (np.inf, 0.0)) -> Case:
     """A random box or hexagon, a random bumper and marker frame, 0.1 mm and 0.03 degrees of noise;
-    calibrated with what the files say of the 9 cm box."""
+    calibrated with what the files say of the 9 cm box. holes: see PlanarRig."""
     luck = np.random.default_rng(seed)
     box, epuck = load_object("box9"), load_robot("epuck")
     if luck.random() < 0.7:
@@ -65,6 +65,6 @@ def calibrated(seed: int) -> Case:
     )
     bumper = replace(epuck.bumper, distance=luck.uniform(0.045, 0.056))
     marker = np.array([*luck.uniform(-0.02, 0.02, 2), luck.uniform(-3.0, 3.0)])
-    rig = PlanarRig(replace(epuck, bumper=bumper), item, marker=marker, seed=seed)
+    rig = PlanarRig(replace(epuck, bumper=bumper), item, marker=marker, seed=seed, holes=holes)
     plan = Plan(epuck.push_distance, epuck.bumper.width / 2.0, box.contact_friction, item.outline)
     return Case(item, bumper.distance, marker, Runs(rig, plan).everything())

@@ -248,6 +248,12 @@ def test_a_scenario_is_what_its_text_says(data, teams, events, count, mass, para
     assert same(again, scenario) and again.text == scenario.text
 
 
+def test_a_value_has_no_settings():
+    scenario = load_scenario("short").settings("group", steps=40)
+    with pytest.raises(SettingsError, match=r"group\.steps\.speed: 'steps' has the value 40"):
+        scenario.settings("group", steps__speed=0.1)
+
+
 def test_defaults_of_nodes_are_filled_in_where_the_scenario_is_silent():
     scenario = load_scenario("short").settings("controller", mpc__horizon=12, mpc__new=1)
     nodes = {

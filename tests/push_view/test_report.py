@@ -2,8 +2,10 @@
 
 from dataclasses import replace
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.patches import Circle
 from PIL import Image
 from rclpy.serialization import serialize_message
 
@@ -13,8 +15,9 @@ from push_record.bag import BagWriter
 from push_record.collisions import Collisions
 from push_record.contents import load
 from push_ros.conversions import contacts_to_ros, pose_stamped_to_ros, poses_to_ros, time_to_ros
+from push_scenario.scenario import load_scenario
 from push_view.bodies import bodies_of
-from push_view.drawing import body_vertices, moments
+from push_view.drawing import body_vertices, draw_trajectory, moments
 from push_view.report import PRODUCTS, final_error, write_report
 from sim_bridge.world import Contact
 
@@ -126,6 +129,23 @@ def test_report_of_several_teams_has_a_page_each(two_teams, tmp_path):
     assert (tmp_path / "out" / "trajectory.png").stat().st_size > 1000
     text = (tmp_path / "out" / "report.pdf").read_bytes()
     assert text.count(b"/Type /Page\n") + text.count(b"/Type /Page ") == 3
+
+
+def test_the_picture_of_a_run_shows_obstacles_as_they_are_and_its_legend_hides_nothing(tmp_path):
+    scenario = load_scenario("group-ellipse")
+    bag = Bag(tmp_path / "bag", scenario)
+    names = (*scenario.robots, *scenario.objects)
+    for i in range(5):
+        bag.poses({n: np.array([0.1 * i, 0.3 * k, 0.0]) for k, n in enumerate(names)}, 0.1 * i)
+    figure, axes = plt.subplots(figsize=(9, 6))
+    draw_trajectory(axes, load(bag.close()))
+    figure.canvas.draw()
+    shown = axes.get_legend().get_window_extent()
+    assert shown.y1 < axes.get_window_extent().y0
+    (first, second) = [p for p in axes.patches if isinstance(p, Circle)]
+    assert [*first.center, first.radius, *second.center] == [0.1, 0.55, 0.15, 0.3, -0.75]
+    assert not axes.images
+    plt.close(figure)
 
 
 def test_report_of_a_thousand_bodies(scenario, tmp_path):

@@ -102,6 +102,34 @@ def test_events_carry_poses_and_states_and_nothing_that_is_not_json(page):
     assert seen["log", "/"]["entries"] == [[0.0, "PLANNING", state.reason]]
 
 
+def test_a_run_that_begins_anew_has_a_log_and_figures_of_its_own(page):
+    """Time goes back, as after a reset of the world or a restart of the suite."""
+    reports = page.suite.node.create_publisher(Report, "/report", STATUS)
+
+    def told(second, name):
+        state = JobState(system="swarm", robots=["epuck1"], object="box", state_name=name)
+        state.header.stamp.sec = second
+        page.suite.states["/"].publish(state)
+
+    def log(enough):
+        seen = page.events(lambda s: enough(s.get(("log", "/"), {}).get("entries", [])))
+        return [(t, name) for t, name, _ in seen["log", "/"]["entries"]], seen
+
+    told(0, "IDLE")
+    log(lambda entries: len(entries) == 1)
+    told(14, "PUSHING")
+    log(lambda entries: len(entries) == 2)
+    assert page.until(lambda: reports.get_subscription_count() > 0)
+    made = Report_("push", (Figure("to the target", 0.4, "m"),))
+    reports.publish(report_to_ros(made, JobState().header.stamp, "swarm", "box"))
+    rows = page.events(lambda s: len(s.get(("panel", "/"), {}).get("rows", [])) > 1)
+    assert any(r["name"] == "to the target" for r in rows["panel", "/"]["rows"])
+    told(1, "IDLE")
+    entries, _ = log(lambda entries: len(entries) == 1)
+    assert entries == [(1.0, "IDLE")]
+    page.events(lambda s: s.get(("panel", "/"), {}).get("rows") == [])
+
+
 def test_the_panel_of_a_single_robot_and_the_plan(page):
     page.suite.states["/"].publish(JobState(system="single", robots=["epuck1"], object="box"))
     reports = page.suite.node.create_publisher(Report, "/epuck1/report", STATUS)

@@ -103,6 +103,12 @@ class Page:
         """[m, m, rad] of a body as the page has it."""
         return self.value(f"window.newest['{name}']")
 
+    def send(self, x, y, theta):
+        """A typed goal."""
+        self.fill(x=f"{x:.3f}", y=f"{y:.3f}", theta=f"{theta:.3f}")
+        self.value("document.querySelector('#typed button[value=go]').click()")
+        self.until("document.getElementById('answer').textContent === 'the goal is accepted'", 30.0)
+
     def reached(self, limit=120.0):
         self.until("document.getElementById('state').textContent === 'IDLE'", limit)
         assert "reached" in self.text("reason") or "goal" in self.text("reason")
@@ -139,6 +145,7 @@ def far(a, b):
 def test_single_by_everything_that_the_page_offers(page):
     page.start("single", "short")
     begun = page.shown_pose("box")
+    assert page.touch != ("Escape" in page.text("hint"))
     # a goal by drag, planned first, then carried out
     page.click("preview")
     page.drag_goal(0.1, 0.04, 0.1)
@@ -146,52 +153,86 @@ def test_single_by_everything_that_the_page_offers(page):
     assert page.shown_pose("box") == begun
     page.click("execute")
     page.until("document.getElementById('state').textContent === 'PUSHING'", 60.0)
-    # pause, and go on
-    page.click("pause")
-    page.until("document.getElementById('trouble').textContent === 'the suite is paused'")
-    time.sleep(0.3)  # a picture that was under way
-    still = page.shown_pose("box")
-    time.sleep(0.5)
-    assert page.shown_pose("box") == still
-    page.click("pause")
+    pause_and_go_on(page, "box")
     page.reached()
     assert far(page.shown_pose("box"), (0.1, 0.04)) < 0.02
     assert page.value("document.querySelectorAll('.chart').length") >= 3
-    # the object moved by hand, a typed goal, cancelled
-    page.choose("move")
-    box = page.shown_pose("box")
-    page.drag(page.pixel(*box[:2]), page.pixel(box[0], box[1] + 0.2))
-    there = (box[0], box[1] + 0.2)
-    assert until(lambda: far(page.shown_pose("box"), there) < 0.02, 5.0), page.text("answer")
-    page.choose("goal")
     page.click("preview")
-    page.fill(x="0.1", y="0.0", theta="0.0")
-    page.value("document.querySelector('#typed button[value=go]').click()")
-    page.until("document.getElementById('answer').textContent === 'the goal is accepted'")
-    page.click("cancel")
-    page.until("document.getElementById('state').textContent === 'IDLE'")
-    # reset, and a robot that fails
-    page.click("reset")
-    assert until(lambda: far(page.shown_pose("box"), begun) < 0.002, 5.0)
-    page.choose("kill")
-    nobody = page.pixel(0.4, 0.4)
-    page.drag(nobody, nobody)
-    page.until("document.getElementById('answer').textContent.includes('no robot')")
-    robot = page.pixel(*page.shown_pose("epuck1")[:2])
-    page.drag(robot, robot)
-    page.until("document.getElementById('answer').textContent.includes('obeys no more')")
+    displace(page, "box")
+    send_and_cancel(page, 0.1, 0.0)
+    reset(page, "box", begun)
+    kill(page, "epuck1", (0.4, 0.4))
 
 
 @pytest.mark.parametrize(
-    ("system", "scenario", "item", "goal"),
-    [("group", "group-ellipse", "plate", None), ("swarm", "swarm-square", "square", None)],
+    ("system", "scenario", "item"),
+    [("group", "group-ellipse", "plate"), ("swarm", "swarm-square", "square")],
 )
-def test_group_and_swarm_reach_a_typed_goal(page, system, scenario, item, goal):
+def test_group_and_swarm_by_everything_that_the_page_offers(page, system, scenario, item):
     page.start(system, scenario)
-    x, y, theta = page.shown_pose(item)
-    page.fill(x=f"{x + 0.3:.3f}", y=f"{y + 0.1:.3f}", theta=f"{theta:.3f}")
-    page.value("document.querySelector('#typed button[value=go]').click()")
-    page.until("document.getElementById('answer').textContent === 'the goal is accepted'", 30.0)
+    begun = x, y, theta = page.shown_pose(item)
+    page.send(x + 0.3, y + 0.1, theta)
     page.until("document.querySelectorAll('#legend button').length > 4", 60.0)
+    assert until(lambda: far(page.shown_pose(item), begun) > 0.02, 120.0), page.text("state")
+    pause_and_go_on(page, item)
     page.reached(240.0)
     assert far(page.shown_pose(item), (x + 0.3, y + 0.1)) < 0.03
+    page.drag_goal(x + 0.5, y, theta)
+    page.until("document.getElementById('state').textContent !== 'IDLE'")
+    page.reached(240.0)
+    assert far(page.shown_pose(item), (x + 0.5, y)) < 0.04  # a pixel of the narrow page is 1 cm
+    reset(page, item, begun)
+    displace(page, item)
+    send_and_cancel(page, x + 0.3, y + 0.1)
+    robot = page.value("Object.keys(window.newest)[0]")
+    kill(page, robot, (x + 0.8, y + 0.5))
+
+
+def pause_and_go_on(page, item):
+    page.click("pause")
+    page.until("document.getElementById('trouble').textContent === 'the suite is paused'")
+    time.sleep(0.3)  # a picture that was under way
+    still = page.shown_pose(item)
+    time.sleep(0.5)
+    assert page.shown_pose(item) == still
+    page.click("pause")
+
+
+def displace(page, item):
+    """Move an object by hand."""
+    page.choose("move")
+    x, y, _ = page.shown_pose(item)
+    page.drag(page.pixel(x, y), page.pixel(x, y + 0.2))
+    there = (x, y + 0.2)
+    assert until(lambda: far(page.shown_pose(item), there) < 0.02, 5.0), page.text("answer")
+    page.choose("goal")
+
+
+def send_and_cancel(page, x, y):
+    """Cancel is in sight, wherever the page is scrolled to."""
+    page.send(x, y, 0.0)
+    for place in ("0", "document.body.scrollHeight"):
+        page.value(f"scrollTo(0, {place})")
+        top, bottom, height = page.value(
+            "(r => [r.top, r.bottom, innerHeight])"
+            "(document.getElementById('cancel').getBoundingClientRect())"
+        )
+        assert top >= 0.0 and bottom <= height
+    page.click("cancel")
+    page.until("document.getElementById('state').textContent === 'IDLE'")
+
+
+def reset(page, item, begun):
+    page.click("reset")
+    assert until(lambda: far(page.shown_pose(item), begun) < 0.002, 5.0)
+
+
+def kill(page, robot, nobody):
+    """A robot fails; a click where there is none is told."""
+    page.choose("kill")
+    empty = page.pixel(*nobody)
+    page.drag(empty, empty)
+    page.until("document.getElementById('answer').textContent.includes('no robot')")
+    there = page.pixel(*page.shown_pose(robot)[:2])
+    page.drag(there, there)
+    page.until("document.getElementById('answer').textContent.includes('obeys no more')")
