@@ -52,8 +52,8 @@ DECIDES_NOTHING = {
     "push_ros/diagnostics.py:Diagnostics.publish": PERSON,
     "push_ros/process.py:Spinner.until": "a limit that its caller sets, who is no node",
     "push_supervisor/node.py:SupervisorNode._connect": LIVE,
-    "push_planner/planner.py:_Work.__init__": COST,
-    "push_planner/planner.py:_Work.counted": COST,
+    "push_planner/work.py:Work.__init__": COST,
+    "push_planner/work.py:Work.counted": COST,
     "push_planner/node.py:PlannerNode.__init__": "its timer looks for the first map, see below",
     "push_planner/node.py:PlannerNode._on_watchdog": "refuses a request when no map has come, "
     "which a lockstep run has before it starts",

@@ -57,6 +57,7 @@ def test_planner_and_controller_take_up_a_friction(single):
 def test_a_push_that_is_expected_to_slip_ends_and_is_planned_anew():
     """A friction that lets the planned bend slip arrives while the robot is still on its way."""
     scenario = load_scenario("line").settings("bridge", world="planar")
+    scenario = scenario.settings("planner", easing=0.0)  # with tight bends
     start = scenario.objects["box"][1]
     with LockstepRun(scenario, quiet=True) as run:
         run.start()

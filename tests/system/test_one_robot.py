@@ -75,7 +75,7 @@ def test_what_cannot_be_is_refused_at_the_door():
 
 
 def test_a_belief_published_in_mid_push_changes_its_limits_in_the_next_frame():
-    believed = scenario("short")
+    believed = scenario("short").settings(NAME, planner__easing=0.0)  # with tight bends
     friction = believed.objects[OBJECT][0].contact_friction
     with LockstepRun(believed, quiet=True, system=NAME) as run:
         run.start()

@@ -83,7 +83,7 @@ def test_stopped_stream_stops_the_robot_and_its_return_lets_it_go_on(short, monk
 
     def blind(tick, poses):
         frame = observe(tick, poses)
-        sent.append(short.bridge.time > until)
+        sent.append(short.bridge.time > until + 1e-6)
         return frame if sent[-1] else None
 
     monkeypatch.setattr(capture, "observe", blind)
