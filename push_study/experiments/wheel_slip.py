@@ -317,7 +317,7 @@ def conclude(options: StudyOptions, tasks: Sequence[SlipTask], rows: list[Row]) 
 
 def _plot(tasks: Sequence[SlipTask], out: Path) -> None:
     """Figures 2.10-2.17: ways, errors and slips of each case, first seed."""
-    figure, axes = plt.subplots(len(CASES), 3, figsize=(14, 9), squeeze=False)
+    figure, axes = plt.subplots(len(CASES), 3, figsize=(14, 9), squeeze=False, layout="constrained")
     for row, (case, name) in zip(axes, CASES.items(), strict=True):
         for constraint, colour in ((False, "#c22f3d"), (True, "#2a62c9")):
             chosen = [t for t in tasks if (t.case, t.constraint) == (case, constraint)]
