@@ -12,9 +12,10 @@ plan is therefore at least the smallest of these:
 - three runs or more: the distance that the centre must move, or the length in which the object can
   turn as far as it must, and the times of three pushes to begin and of two changes.
 
-The smallest sum over poses is found by branch and bound. A box of positions and headings has a
-bound of its own, and the box with the lowest bound is divided next. The work may stop at any time:
-the lowest bound of the boxes that are left is valid.
+The first push needs room for the robot at the start, the last one at the goal; other sides do not
+count there. The smallest sum over poses is found by branch and bound. A box of positions and
+headings has a bound of its own, and the box with the lowest bound is divided next. The work may
+stop at any time: the lowest bound of the boxes that are left is valid.
 """
 
 import heapq
@@ -107,7 +108,9 @@ def _run(
 def _of_boxes(
     boxes: Any,
     starts: Any,
+    leaves: Any,
     goals: Any,
+    arrives: Any,
     contacts: Any,
     radii: Any,
     changes: Any,
@@ -129,6 +132,7 @@ def _of_boxes(
     boxes: ``(n, 5)`` x, y [m], theta [rad] of the centre, half the width in x and y [m], in theta
         [rad].
     starts, goals: ``(sides, 3)`` poses of the robot in contact at the start and at the goal.
+    leaves, arrives: ``(sides,)`` whether the robot has room there.
     contacts: ``(sides, 3)`` the same in the frame of the object.
     radii: ``(sides, 2)`` [m] smallest turning radii to the left and to the right.
     changes: ``(sides, sides)`` [s] of a change of the side; infinite on the diagonal.
@@ -158,11 +162,14 @@ def _of_boxes(
             there, here = radii[side], radii[side, ::-1]
             ax, ay, before = starts[side]
             bx, by, after = goals[side]
-            length = _run(ax, ay, before, rx, ry, angle, there, around, slack)
-            first[side] = max(length, gone / fastest[side])
-            # The way into the goal, driven backward: left turns become right ones.
-            length = _run(bx, by, after + math.pi, rx, ry, angle + math.pi, here, around, slack)
-            second[side] = max(length, left / fastest[side])
+            first[side] = second[side] = math.inf
+            if leaves[side]:
+                length = _run(ax, ay, before, rx, ry, angle, there, around, slack)
+                first[side] = max(length, gone / fastest[side])
+            if arrives[side]:
+                # The way into the goal, driven backward: left turns become right ones.
+                length = _run(bx, by, after + math.pi, rx, ry, angle + math.pi, here, around, slack)
+                second[side] = max(length, left / fastest[side])
         for a in range(sides):
             for b in range(sides):
                 result[k] = min(result[k], pace * (first[a] + second[b]) + changes[a, b])
@@ -222,6 +229,9 @@ class CostBound:
         settings, sides, field = scene.settings, scene.sides, scene.field
         contacts = np.array([se2.inverse(s.grasp) for s in sides])
         starts, goals = (np.array([s.robot_pose(pose) for s in sides]) for pose in (start, goal))
+        keeps = scene.leaving(start)
+        leaves = np.array([scene.has_room(p, s, keeps) for p, s in zip(starts, sides, strict=True)])
+        arrives = np.array([scene.has_room(p, s) for p, s in zip(goals, sides, strict=True)])
         limits = np.array([[s.trusted.maximum, s.trusted.minimum] for s in sides])
         radii = 1.0 / np.abs(limits)
         x, y = np.array([s.grasp[:2] for s in sides]).T[:, :, None]
@@ -234,7 +244,7 @@ class CostBound:
         places = field.args[2] / _stride(field)
         self.fastest = fastest
         self._known = (
-            *(starts, goals, contacts, radii, changes, fastest, pace, begin),
+            *(starts, leaves, goals, arrives, contacts, radii, changes, fastest, pace, begin),
             *(ways, places, least, field.values, *field.args),
         )
         speed, change = float(fastest.max()), float(changes.min())
@@ -242,8 +252,9 @@ class CostBound:
         way = float(_way(ways[0], *goal[:2], 0.0, *field.args[:2], places))
         turn = abs(float(se2.wrap(goal[2] - start[2])))
         length = max(max(way, straight) / speed, turn * float(radii.min()))
-        runs = [_run(*a, *b, r, 0.0, 0.0) for a, b, r in zip(starts, goals, radii, strict=True)]
-        self.one = begin + pace * max(length, min(runs))
+        both = np.flatnonzero(leaves & arrives)
+        runs = [_run(*starts[k], *goals[k], radii[k], 0.0, 0.0) for k in both]
+        self.one = begin + pace * max(length, min(runs, default=math.inf))
         self.several = 3.0 * begin + 2.0 * change + pace * length
         self._fixed, self._speed = 2.0 * begin + change, speed / pace
         self.value = min(self.one, self.several, self._fixed + pace * length)

@@ -81,12 +81,7 @@ def test_its_plans_are_chains_of_stable_and_free_pushes_that_the_default_finds_t
         assert plan.segments[-1].object_end == pytest.approx(goal)
         for before, after in zip(plan.segments, plan.segments[1:], strict=False):
             assert before.object_end == pytest.approx(after.object_start)
-        length = sum(s.length for s in plan.segments)
-        changes = 0.0
-        for before, after in zip(plan.segments, plan.segments[1:], strict=False):
-            if before.side != after.side:
-                changes += float(np.hypot(*(before.robot_end - after.robot_start)[:2]))
-        assert plan.cost == pytest.approx(length + changes)  # (2.10)
+        assert plan.cost == pytest.approx(printed.scene.time.of_plan(plan.segments))
         for segment in plan.segments:
             side = printed.scene.sides[segment.side]
             v, omega = segment.trajectory.twist[1:-1].T

@@ -32,7 +32,7 @@ def test_they_reach_their_goals(outline, seed):
 @pytest.mark.long
 def test_pushes_on_the_floor_of_a_recess_and_out_of_it_in_between(robot):
     (recess,) = (s.index for s in pushable_sides(item_of(U).geometry, robot) if s.depth > 0.0)
-    sides = reach(U, [-0.4, 0.0, np.pi / 2], [0.3, 0.3, 0.0])
+    sides = reach(U, [-0.4, 0.0, np.pi / 2], [0.3, 0.6, 0.0])
     assert recess in sides[:-1]
 
 
