@@ -3,7 +3,6 @@
 The package ``launch`` is part of a ROS installation, not of the wheels. Only ``describe`` needs it.
 """
 
-import sys
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from push_bringup.preparation import check_domain, prepare
 from push_bringup.systems import system_of
 from push_model.settings import SettingsError
 from push_ros.process import prepare_environment
+from push_ros.start import command_of
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def processes_of(values: Mapping[str, str], folder: Path) -> list[Process]:
     check_domain(setup.namespace)
     environment = prepare_environment({})
     return [
-        Process(child.name, [sys.executable, "-m", child.module, *child.words], environment)
+        Process(child.name, command_of(child.module, child.words), environment)
         for child in setup.write(folder)
     ]
 

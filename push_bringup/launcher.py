@@ -11,6 +11,7 @@ from pathlib import Path
 
 from push_ros.job_memory import VARIABLE, new_memory
 from push_ros.process import die_with_parent, prepare_environment
+from push_ros.start import command_of
 
 _GRACE = 2.5  # [s] after SIGINT, then SIGTERM
 _MOST_DEATHS = 5  # restarts of one node before it is given up
@@ -20,7 +21,7 @@ _TAIL = 600  # [characters] kept of a dead node's output
 
 @dataclass
 class Child:
-    """A node in a process of its own: ``python -m module words``.
+    """A node in a process of its own, see ``push_ros/start.py``.
 
     bag: folder that it writes, when it is a recorder. memory: file in which it keeps its job, for
     the one that is started in its place; see ``push_ros/job_memory.py``.
@@ -76,7 +77,7 @@ class Launcher:
                 self._start(child)
 
     def _start(self, child: Child) -> None:
-        command = [sys.executable, "-m", child.module, *child.words]
+        command = command_of(child.module, child.words)
         if self._logs is None:
             self._open(child, command, None)
             return

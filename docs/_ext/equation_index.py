@@ -24,10 +24,10 @@ SUBJECTS = {
 }
 _HEAD = (
     "# Equations and code\n\n"
-    "This page tells where each numbered equation and algorithm of the thesis is in the code. It\n"
-    "lists every docstring that cites the number. [Errata](errata.md) explains the equations that\n"
-    "are printed with an error. `python docs/_ext/equation_index.py` writes this page, and a test\n"
-    "compares it with the code.\n"
+    "This page tells where each numbered equation and algorithm of the thesis is in the code. For\n"
+    "each number, it lists the docstrings that cite it. [Errata](errata.md) explains the\n"
+    "equations that are printed with an error. `python docs/_ext/equation_index.py` writes this\n"
+    "page, and a test compares it with the code.\n"
 )
 _RANGE = re.compile(r"\(([2-4])\.(\d+)[a-h]?\)(?:\s*-\s*\((\d)\.(\d+)[a-h]?\))?")
 _ALGORITHM = re.compile(r"Algorithms? (\d)(?:(?: and | or |, )(\d))?")

@@ -96,7 +96,7 @@ def test_a_launch_file_starts_what_planar_push_launch_starts(system, tmp_path):
     values = {a.name: a.default for a in arguments_of(system)}
     found = processes_of({**values, "system": system}, tmp_path)
     expected = prepare(values["scenario"], system=system).write(tmp_path)
-    assert [(p.name, p.command[2:]) for p in found] == [
+    assert [(p.name, p.command[3:]) for p in found] == [
         (c.name, [c.module, *c.words]) for c in expected
     ]
     assert all(p.environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST" for p in found)

@@ -1,0 +1,32 @@
+"""A node's process that is told to end while it loads."""
+
+import os
+import signal
+import subprocess
+import time
+
+import pytest
+
+from push_ros.process import prepare_environment
+from push_ros.start import command_of
+
+SCENARIO = ["--ros-args", "-p", "scenario:=short"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_a_node_loads_ends_it_without_a_traceback(domain, number):
+    environment = prepare_environment(dict(os.environ))
+    line = command_of("push_planner.node", SCENARIO)
+    for moment in (0.2, 0.4, 0.8, 1.2):  # [s] after the start; python itself takes up to 0.1
+        process = subprocess.Popen(line, env=environment, stderr=subprocess.PIPE, text=True)
+        time.sleep(moment)
+        process.send_signal(number)
+        _, said = process.communicate(timeout=60)
+        assert process.returncode == 0 and "Traceback" not in said, said
+
+
+def test_a_module_that_cannot_be_loaded_says_so(domain):
+    done = subprocess.run(
+        command_of("push_planner.atlantis", []), capture_output=True, text=True, check=False
+    )
+    assert done.returncode != 0 and "atlantis" in done.stderr
