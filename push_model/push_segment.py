@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from push_model import se2
 from push_model.arrays import Array
 from push_model.stable_push import CurvatureLimits
@@ -17,7 +19,9 @@ class PushSegment:
     side: index of the pushed side of the object's outline. standoff: where the robot's approach
     begins. k_start, k_end [m]: tangent lengths of (2.4), of the first and of the last curve.
     length [m] of the robot's path. limits: stable curvatures for an object at its nominal place.
-    clearance [m] of robot and object along the path; infinite if unknown.
+    clearance [m] of robot and object along the path; infinite if unknown. turns: whether the robot
+    pushes on a corner, straight ahead, until ``side`` lies flush against its bumper; the object
+    turns meanwhile, and where it ends is only roughly known.
     """
 
     side: int
@@ -32,11 +36,28 @@ class PushSegment:
     limits: CurvatureLimits
     clearance: float
     trajectory: Trajectory
+    turns: bool = False
 
     @property
     def grasp(self) -> Array:
         """Nominal pose ``(3,)`` of the object in the robot frame."""
         return se2.between(self.robot_start, self.object_start)
+
+    @property
+    def object_poses(self) -> Array:
+        """``(n, 3)`` of the object along the trajectory; between its ends if it turns."""
+        poses = self.trajectory.pose
+        if not self.turns:
+            x, y, theta = self.grasp
+            c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+            moved = np.column_stack([c * x - s * y, s * x + c * y, np.full(len(poses), theta)])
+            carried: Array = poses + moved
+            return carried
+        part = np.linspace(0.0, 1.0, len(poses))[:, None]
+        change = self.object_end - self.object_start
+        change[2] = se2.wrap(change[2])
+        between: Array = self.object_start + part * change
+        return between
 
     def contact(self, item: Array) -> Array:
         """Pose ``(3,)`` of the robot in contact with the side, the object being at ``item``."""

@@ -1,7 +1,8 @@
 """Pushes to try when no plan was found: section 2.5, state S2.
 
 The thesis draws one random curvature. Here several curvatures are drawn, a straight push is added,
-and every side and length is tried. The result thus depends less on the random draw.
+and every side and length is tried. The result thus depends less on the random draw. Last come
+pushes on a corner, which turn the object where no stable push leads away (``turning_push.py``).
 """
 
 from collections.abc import Iterator
@@ -19,6 +20,7 @@ from push_planner.push_graph import PushStep
 from push_planner.push_plan import PlanError, PlanningFailed, Progress, PushPlan
 from push_planner.refusal import check_way
 from push_planner.robot_path import has_way
+from push_planner.turning_push import turning_pushes
 
 
 def preemptive_pushes(
@@ -89,9 +91,13 @@ def plan_after_preemptive_push(
     """
     planner.check(start, "start", PlanError.START_OCCUPIED)
     planner.check(goal, "goal", PlanError.GOAL_OCCUPIED)
-    check_way(planner.scene, start, robot)
     offers = preemptive_pushes(planner, start, goal, seed, robot=robot)
     offers = offers[: planner.settings.max_preemptive]
+    yield Progress("pushes that turn the object", None)
+    centre, most = planner.scene.item.mass_pose(start), planner.settings.max_turning
+    offers += turning_pushes(planner.scene, centre, robot, most)
+    if not offers:
+        check_way(planner.scene, start, robot)
     yield Progress("pre-emptive pushes", None)
     least = planner.lower_bound(start, goal)
     failure = "no push away from the start was found"
@@ -120,7 +126,7 @@ def plan_after_preemptive_push(
 
 
 def _preceded(planner: PushPlanner, first: PushSegment, plan: PushPlan, least: float) -> PushPlan:
-    """A plan with a push before it, at the cost that the search would give it. least: [s] bound of
+    """A plan with a push before it, at the cost that the search would give it. least: [s] bound on
     the cost of any plan."""
     clearance = min(first.clearance, plan.clearance)
     segments = (first, *plan.segments)

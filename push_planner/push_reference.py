@@ -50,7 +50,7 @@ def joined(
 ) -> tuple[PushSegment, ...]:
     """Pushes as they are carried out: those in a row on the same side become one without a stop."""
     result = []
-    for _, group in groupby(segments, key=lambda segment: segment.side):
+    for _, group in groupby(segments, key=lambda segment: (segment.side, segment.turns)):
         run = list(group)
         if len(run) == 1:
             result.append(run[0])

@@ -231,6 +231,15 @@ class PushScene:
         """
         return side.depth + self.settings.standoff, side.depth + _CLOSE * self.settings.standoff
 
+    def room_to_back_off(self, contact_pose: Array, leaving: float = math.inf) -> float | None:
+        """[m] that the robot can back off from a contact pose ``(3,)`` at a convex outline; None if
+        it cannot. leaving: see ``rooms``."""
+        far = self.settings.standoff
+        for back in (far, _CLOSE * far):
+            if self._rooms(contact_pose[None], back, self.robot_keeps(leaving))[0]:
+                return back
+        return None
+
     def standoff(self, contact_pose: Array, side: PushSide) -> Array:
         """Robot pose ``(3,)`` behind a contact pose, where an approach begins."""
         far, near = self.backs(side)

@@ -195,6 +195,13 @@ class PlannerSettings:
     max_preemptive: int = bounded(
         8, low=0, high=100, doc="Maximum number of pre-emptive pushes that are tried"
     )
+    max_turning: int = bounded(
+        6,
+        low=0,
+        high=100,
+        doc="Maximum number of pushes on a corner of the object that are tried as pre-emptive "
+        "pushes",
+    )
     seed: int = bounded(
         1,
         low=1,

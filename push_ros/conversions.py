@@ -246,6 +246,7 @@ def segment_to_ros(segment: PushSegment) -> SegmentMessage:
         curvature_max=float(segment.limits.maximum),
         clearance=float(segment.clearance),
         trajectory=trajectory_to_ros(segment.trajectory),
+        turns=segment.turns,
     )
 
 
@@ -264,6 +265,7 @@ def segment_from_ros(message: SegmentMessage) -> PushSegment:
         limits_from_ros(message),
         message.clearance,
         trajectory_from_ros(message.trajectory),
+        bool(message.turns),
     )
 
 

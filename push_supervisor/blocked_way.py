@@ -45,8 +45,7 @@ def obstruction(
     """
     done = 0.0
     for number, segment in enumerate(segments, 1):
-        robot = segment.trajectory.pose
-        pushed = _moved(robot, segment.grasp)
+        robot, pushed = segment.trajectory.pose, segment.object_poses
         first = int(np.argmin(np.hypot(*(pushed[:, :2] - item[:2]).T))) if number == 1 else 0
         robot, pushed = robot[first:], pushed[first:]
         way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(pushed[:, :2], axis=0).T))])
@@ -60,14 +59,6 @@ def obstruction(
             return Obstruction(done + met, number, at)
         done += float(way[-1])
     return None
-
-
-def _moved(poses: Array, frame: Array) -> Array:
-    """A frame ``(3,)`` that moves along with poses ``(n, 3)``: ``(n, 3)``."""
-    c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-    x, y = c * frame[0] - s * frame[1], s * frame[0] + c * frame[1]
-    moved: Array = poses + np.column_stack([x, y, np.full(len(poses), frame[2])])
-    return moved
 
 
 def _first_met(outline: Array, poses: Array, middle: Array, radius: float) -> int | None:

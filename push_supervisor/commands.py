@@ -50,6 +50,13 @@ class FollowPush:
 
 
 @dataclass(frozen=True)
+class FollowTurn:
+    """Push on a corner, so that the object turns."""
+
+    segment: PushSegment
+
+
+@dataclass(frozen=True)
 class FollowRetreat:
     """Back off from the object."""
 
@@ -72,7 +79,7 @@ class Finish:
     message: str
 
 
-Motion = FollowPath | FollowApproach | FollowPush | FollowRetreat
+Motion = FollowPath | FollowApproach | FollowPush | FollowTurn | FollowRetreat
 """Commands that a controller carries out."""
 
 Question = MakePlan | FindPath | Motion

@@ -240,10 +240,8 @@ class Machine:
             self.pushes += 1
             following = self.index + 1
             self._tried.progress(len(self.segments) - following)
-            if (
-                following < len(self.segments)
-                and self.segments[following].side == self.segment.side
-            ):
+            rest = [] if self.segment.turns else self.segments[following:]
+            if rest and rest[0].side == self.segment.side:
                 self.index = following
                 self._push()
             else:
@@ -269,7 +267,8 @@ class Machine:
             State.PUSHING,
             f"push {self.index + 1} of {len(self.segments)} on side {self.segment.side}",
         )
-        self._say(commands.FollowPush(self.segment))
+        follow = commands.FollowTurn if self.segment.turns else commands.FollowPush
+        self._say(follow(self.segment))
 
     def _detached(self) -> None:
         if self._recovering:
@@ -277,6 +276,9 @@ class Machine:
             return
         if self._backing_off:
             self._backed_off()
+            return
+        if self.segment.turns:
+            self._replan("the object was turned, and may be anywhere near", backed_off=True)
             return
         self.index += 1
         if self.index < len(self.segments):

@@ -19,6 +19,7 @@ from push_supervisor.settings import SupervisorSettings
 _STEPS = 6  # places along a retreat that are looked at
 _LEAST = 1e-3  # [m] of a retreat that has no room at all
 _SLACK = 5e-3  # [m] by which circles for an outline may ask for too much
+_TURN_ACCELERATION = 0.2  # [m/s^2] of a push on a corner
 _GIVE = 1e-3  # [m] that a retreat may come nearer to the object, as far as poses can be told
 
 
@@ -37,6 +38,14 @@ def approach(
     begin = se2.compose(contact, np.array([-ahead, 0.0, 0.0]))
     s = settings
     return line(begin, ahead, s.approach_speed, s.acceleration, braking=s.contact_braking)
+
+
+def turn(segment: PushSegment, robot: Array, item: Array, speed: float) -> Trajectory:
+    """Straight on from contact with a corner, at up to a speed [m/s], as far as the push leads."""
+    contact = segment.contact(item)
+    ahead = float(se2.between(robot, contact)[0])
+    begin = se2.compose(contact, np.array([-ahead, 0.0, 0.0]))
+    return line(begin, ahead + segment.length, speed, _TURN_ACCELERATION)
 
 
 def retreat(

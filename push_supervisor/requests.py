@@ -42,6 +42,7 @@ PEERS: Mapping[type[Question], Peer] = {
     commands.FollowPath: Peer.CONTROLLER,
     commands.FollowApproach: Peer.CONTROLLER,
     commands.FollowPush: Peer.CONTROLLER,
+    commands.FollowTurn: Peer.CONTROLLER,
     commands.FollowRetreat: Peer.CONTROLLER,
 }
 """The node to which each kind of command is sent."""

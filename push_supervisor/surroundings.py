@@ -105,8 +105,9 @@ class Surroundings:
         if self.grid is None:
             return ""
         for number, segment in enumerate(segments, 1):
-            for pose in segment.trajectory.pose[::2]:
-                item = se2.compose(pose, segment.grasp)
+            for pose, item in zip(
+                segment.trajectory.pose[::2], segment.object_poses[::2], strict=True
+            ):
                 if overlaps(self.grid, self._outline, pose) or overlaps(
                     self.grid, self._item_outline, item
                 ):
@@ -168,6 +169,8 @@ class Surroundings:
                 return self.approach(segment, robot, item)
             case commands.FollowPush(segment):
                 return segment.trajectory, self.push(segment)
+            case commands.FollowTurn(segment):
+                return self.turn(segment, robot, item)
             case commands.FollowRetreat():
                 return self.retreat(robot, item)
 
@@ -193,6 +196,11 @@ class Surroundings:
         circles = motions.near(self.walls, way, _LOOK_AHEAD * self.robot.max_speed)
         reach = self.robot.footprint_radius - self.robot.body_radius
         return motions.spared(motions.widened(circles, way, reach, _STRAY), way)
+
+    def turn(self, segment: PushSegment, robot: Array, item: Array) -> tuple[Trajectory, Array]:
+        """Straight on from contact with a corner, keeping off walls."""
+        way = motions.turn(segment, robot, item, float(segment.trajectory.twist[:, 0].max()))
+        return way, self._beside(self.walls, way)
 
     def retreat(self, robot: Array, item: Array) -> tuple[Trajectory, Array]:
         """Away from the object, keeping off walls."""

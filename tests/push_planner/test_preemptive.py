@@ -1,7 +1,5 @@
 """Plans that begin with a pre-emptive push, and plans round other bodies."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -72,12 +70,13 @@ def test_what_no_push_can_mend_keeps_its_code(robot, box, start, goal, code):
 def test_the_number_of_pushes_tried_is_bounded(robot, box):
     """In a room with a wall across nothing helps; the last failure is told."""
     walled = EnvironmentSpec((3.0, 2.0), boxes=(BoxSpec((0.0, 0.0), (0.1, 2.0)),))
-    settings = replace(PlannerSettings(), max_preemptive=3, rrt_iterations=50)
-    planner = PushPlanner(settings, rasterise(walled), robot, box)
-    with pytest.raises(PlanningFailed) as failure:
-        last(plan_after_preemptive_push(planner, START, np.array([0.8, 0.0, 0.0]), 1))
-    assert failure.value.code is PlanError.NO_PUSH_SEQUENCE
-    assert "none of 3 pre-emptive pushes" in str(failure.value)
+    for turning in (0, 2):
+        limits = {"max_preemptive": 3, "max_turning": turning, "rrt_iterations": 50}
+        planner = PushPlanner(PlannerSettings(**limits), rasterise(walled), robot, box)
+        with pytest.raises(PlanningFailed) as failure:
+            last(plan_after_preemptive_push(planner, START, np.array([0.8, 0.0, 0.0]), 1))
+        assert failure.value.code is PlanError.NO_PUSH_SEQUENCE
+        assert f"none of {3 + turning} pre-emptive pushes" in str(failure.value)
 
 
 def test_cells_under_a_body_are_occupied_and_no_others(box):

@@ -35,16 +35,17 @@ def test_trajectory_round_trip():
         assert np.array_equal(getattr(t, name), getattr(back, name))
 
 
-def segment():
+def segment(turns=False):
     way = line(np.array([1.0, 2.0, 0.5]), 0.3, 0.1, 0.1)
     first, last = way.pose[0], way.pose[-1]
     limits = CurvatureLimits(-1.5, 2.0)
     item, after = first + [0.1, 0.0, 0.0], last + [0.1, 0.0, 0.0]
-    return PushSegment(3, item, after, first, last, first, 0.3, 0.4, 0.3, limits, 0.02, way)
+    return PushSegment(3, item, after, first, last, first, 0.3, 0.4, 0.3, limits, 0.02, way, turns)
 
 
-def test_segment_round_trip():
-    there = segment()
+@pytest.mark.parametrize("turns", [False, True])
+def test_segment_round_trip(turns):
+    there = segment(turns)
     back = c.segment_from_ros(c.segment_to_ros(there))
     for name, value in vars(there).items():
         if isinstance(value, np.ndarray):

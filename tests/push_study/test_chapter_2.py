@@ -10,9 +10,10 @@ from push_bringup.node_settings import resolved
 from push_model import se2
 from push_mpc import ContactForceSettings
 from push_mpc.contact_force_mpc import PRINTED_GAINS
-from push_planner import PlannerSettings, PushPlanner, push_sides
+from push_planner import DistanceField, PlannerSettings, PushPlanner, PushScene, push_sides
 from push_scenario.scenario import load_scenario
 from push_study.experiments import (
+    beside_walls,
     changing_world,
     displaced,
     goals_in_a_row,
@@ -214,3 +215,24 @@ def test_what_slides_along_the_bumper_is_measured_in_pushes_only():
     assert three_push.slid(robot, sliding) == pytest.approx(0.02, abs=1e-3)
     standing = np.repeat(pushed[:1], 60, axis=0)  # the robot drives, the object does not
     assert three_push.slid(robot, standing) == 0.0
+
+
+@pytest.mark.long
+def test_an_object_beside_a_wall_is_turned_and_brought_to_its_goal(tmp_path):
+    options = StudyOptions(beside_walls.SCENARIOS, 1, 1, tmp_path)
+    (task,) = beside_walls.tasks(options)
+    scenario, drawn = beside_walls.drawn_scenario(task)
+    again, _ = beside_walls.drawn_scenario(task)
+    assert scenario.text == again.text and drawn >= 1
+    scene = PushScene(
+        DistanceField(scenario.grid),
+        scenario.robot()[1],
+        scenario.object()[1],
+        PlannerSettings(),
+    )
+    assert scene.object_clearance(next(iter(scenario.objects.values()))[1]) < beside_walls.CLOSE
+    row = beside_walls.trial(task)
+    assert row["success"], row
+    assert row["collisions"] == 0 and row["replans"] >= 1
+    total = beside_walls.statistics([row])
+    assert total == {"starts_beside_walls": drawn, "without_direct_plan": 1, "reached": 1}

@@ -16,6 +16,7 @@ from push_supervisor.commands import (
     FollowPath,
     FollowPush,
     FollowRetreat,
+    FollowTurn,
     MakePlan,
     Stop,
 )
@@ -36,8 +37,8 @@ from push_supervisor.events import (
 )
 
 
-def segment(side):
-    return SimpleNamespace(side=side, object_end=f"end of {side}")
+def segment(side, turns=False):
+    return SimpleNamespace(side=side, object_end=f"end of {side}", turns=turns)
 
 
 def make(there=False, touching=False, close=True, **changes):
@@ -106,6 +107,39 @@ def test_algorithm_4_with_a_change_of_side():
     answer["there"] = True
     out = machine.handle(DONE)
     assert machine.state is State.IDLE and out[-1].code is JobError.NONE
+
+
+def turning(*sides):
+    """A plan that begins with a push on a corner, which leaves the first side flush."""
+    return PlanFound((segment(sides[0], True), *(segment(s) for s in sides)))
+
+
+def test_after_a_push_on_a_corner_the_robot_backs_off_and_a_new_plan_is_made():
+    machine, _ = make()
+    out = walk(machine, GOAL, turning(0, 1), PATH, DONE, DONE)
+    assert machine.state is State.PUSHING and commands(out) == [FollowTurn]
+    out = machine.handle(DONE)
+    assert machine.state is State.DETACHING and commands(out) == [FollowRetreat]
+    out = machine.handle(DONE)
+    assert machine.state is State.PLANNING and commands(out) == [MakePlan]
+    assert "turned" in machine.reason and machine.pushes == machine.replans == 1
+
+
+def test_pushes_on_corners_that_lead_nowhere_come_to_an_end():
+    machine, _ = make(max_replans=3)
+    walk(machine, GOAL)
+    count = 0
+    while machine.busy and count < 10:
+        out = walk(machine, turning(0), PATH, DONE, DONE, DONE, DONE)
+        count += 1
+    assert count == 4 and out[-1].code is JobError.EXECUTION_FAILED
+
+
+def test_a_push_on_a_corner_that_fails_is_backed_off_from():
+    machine, _ = make()
+    walk(machine, GOAL, turning(0), PATH, DONE, DONE)
+    assert commands(machine.handle(MotionFailed("stuck"))) == [FollowRetreat]
+    assert commands(machine.handle(DONE)) == [MakePlan]
 
 
 def test_the_last_push_ends_the_job_without_a_retreat():
@@ -501,6 +535,7 @@ ANY = st.sampled_from(
         planned(0),
         planned(0, 1),
         planned(1, 1),
+        turning(0, 1),
         failed(),
         failed(False),
         failed(crowded=True),
@@ -521,6 +556,7 @@ MOTIONS = {
     FollowPath,
     FollowApproach,
     FollowPush,
+    FollowTurn,
     FollowRetreat,
 }
 

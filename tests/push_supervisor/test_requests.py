@@ -17,6 +17,7 @@ from push_supervisor.commands import (
     FollowPath,
     FollowPush,
     FollowRetreat,
+    FollowTurn,
     MakePlan,
     Question,
 )
@@ -32,6 +33,7 @@ QUESTIONS = (
     FollowPath("t"),
     FollowApproach("s"),
     FollowPush("s"),
+    FollowTurn("s"),
     FollowRetreat(),
 )
 ALL = frozenset(Peer)

@@ -11,7 +11,7 @@ from push_model.jobs import GoalRefused, JobError
 from push_model.occupancy import rasterise
 from push_model.pushable_sides import pushable_sides
 from push_model.specs import BoxSpec, EnvironmentSpec
-from push_supervisor import SupervisorSettings, Surroundings, motions
+from push_supervisor import SupervisorSettings, Surroundings, commands, motions
 from push_supervisor.footprint import gap
 from tests.outlines import CONCAVE, SLIM, U, item_of
 
@@ -189,3 +189,32 @@ def test_a_map_is_new_when_it_differs(around, robot):
     assert len(around.walls) < len(before)
     around.change_settings(SupervisorSettings(obstacle_margin=0.02))
     assert around.walls[0, 2] == pytest.approx(robot.body_radius + 0.02 + 0.005)
+
+
+def test_a_push_on_a_corner_leads_straight_on_from_where_the_robot_is(robot, box):
+    """Also where robot and object are a little beside their places."""
+    random = np.random.default_rng(5)
+    for _ in range(50):
+        begin = random.uniform([-0.3, -0.3, -3.0], [0.3, 0.3, 3.0])
+        segment = replace(push(robot, box, begin, 0.05), turns=True)
+        off = random.uniform(-0.003, 0.003, 3)
+        item = segment.object_start + off
+        contact = segment.contact(item)
+        here = se2.compose(contact, np.array([-0.002, 0.001, 0.01]))
+        around = Surroundings(robot, box, {}, SETTINGS)
+        around.take_map(rasterise(WALLED))
+        way, _ = around.motion(commands.FollowTurn(segment), here, item)
+        first, last = (se2.between(contact, way.pose[k]) for k in (0, -1))
+        assert first == pytest.approx([-0.002, 0.0, 0.0], abs=2e-5)
+        assert last == pytest.approx([segment.length, 0.0, 0.0], abs=2e-5)
+        assert way.twist[:, 0].max() <= segment.trajectory.twist[:, 0].max() + 1e-9
+
+
+def test_the_object_is_where_the_push_moves_it(robot, box):
+    begin = np.array([0.2, -0.1, 0.7])
+    segment = push(robot, box, begin, 0.3)
+    for pose, item in zip(segment.trajectory.pose, segment.object_poses, strict=True):
+        assert np.abs(se2.between(se2.compose(pose, segment.grasp), item)).max() < 1e-9
+    turned = replace(segment, turns=True, object_end=segment.object_end + [0.0, 0.0, 0.4])
+    assert turned.object_poses[-1] == pytest.approx(turned.object_end)
+    assert turned.object_poses[0] == pytest.approx(turned.object_start)
