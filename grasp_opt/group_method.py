@@ -6,12 +6,14 @@ from typing import Any
 
 import numpy as np
 
+from grasp_opt.grasp_certificate import GraspCertificate
 from grasp_opt.group_control import GroupControlSettings
 from grasp_opt.group_job import GroupJob, GroupJobSettings, Request
 from grasp_opt.group_push import GroupPushSettings
 from grasp_opt.moves import MoveSettings
 from grasp_opt.object_trajectory import ObjectTrajectory, sampled
 from grasp_opt.plan_source import InlinePlans, PlanFailed, PlanSource
+from grasp_opt.step_planner import GroupPlan
 from push_job.method import Arena, Certificate, MethodSpec, Refusal, Seen, Task, Told
 from push_job.report import Drawable, Figure, Report, Status, arrows, discs, polyline
 from push_model import se2
@@ -24,6 +26,7 @@ from push_model.jobs import JobError, JobPhase
 from push_model.object_way import WayFinder
 from push_model.settings import SettingsError
 from push_model.specs import ObjectSpec, RobotSpec
+from push_model.stick_certificate import ContactBelief
 
 MOST = 5
 """Robots of a group at most."""
@@ -48,6 +51,8 @@ class GroupMethod:
             InlinePlans(arena.grid, arena.object, self._names[0]) if source is None else source
         )
         self._asked: Request | None = None
+        self._believed: ContactBelief | None = None
+        self._known: tuple[GroupPlan, ContactBelief, float] | None = None  # of the last push
         self._finder = WayFinder(FreeSpace(arena.grid), arena.item.geometry.outline, 0.0)
         self.job = GroupJob(
             arena.item,
@@ -175,6 +180,8 @@ class GroupMethod:
             Figure("heading error", abs(float(off[2])), "rad"),
             Figure("grasp margin", float(plan.placement.margin), "", 0.0),
         ]
+        if (believed := self._believed) is not None:
+            figures.insert(3, Figure("certified margin", self._certified(plan, believed), "", 0.0))
         command = step.command
         if command is not None:
             turn = se2.rotation_matrix(float(pose[2]))
@@ -188,6 +195,15 @@ class GroupMethod:
             wrench = turn @ command.wrench[:2]
             shapes.append(arrows("wrench", pose[None, :2], _PER_NEWTON * wrench[None]))
         return Report(step.phase.value, tuple(figures), tuple(shapes))
+
+    def _certified(self, plan: GroupPlan, believed: ContactBelief) -> float:
+        """The certified margin of the push under way; computed anew for a new plan or belief."""
+        known = self._known
+        if known is None or known[0] is not plan or known[1] != believed:
+            twists = plan.trajectory.body_twists
+            certificate = GraspCertificate(self._item, believed, twists)
+            known = self._known = plan, believed, certificate.margin(plan.placement.contacts)
+        return known[2]
 
     def _cones(self, points: Array, normals: Array) -> list[Drawable]:
         half = math.atan(self._item.contact_friction)
@@ -242,6 +258,7 @@ class GroupMethod:
             space = FreeSpace(self._arena.grid)
             self._finder = WayFinder(space, item.geometry.outline, 0.0)
         self._item = item
+        self._believed = ContactBelief.of(belief, self._arena.object)
         self.job.believe(item, robot)
         if (POSES, "latency") in belief.values:
             self.job.pose_delay = belief.latency.value

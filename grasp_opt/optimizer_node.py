@@ -23,6 +23,7 @@ from grasp_opt.warm_up import warm_up
 from push_model.belief import Belief
 from push_model.occupancy import OccupancyGrid as Grid
 from push_model.settings import SettingsError
+from push_model.stick_certificate import ContactBelief
 from push_model.trajectory import Trajectory
 from push_msgs.action import PlanGroupPush
 from push_msgs.msg import GroupPlan as PlanMessage
@@ -63,6 +64,7 @@ class OptimizerNode(Node):
         item = str(self.declare_parameter("object", item).value)
         _, self._robot = scenario.robot(self.robots[0])
         self.object, self._item = scenario.object(item)
+        self._believed: ContactBelief | None = None
         values = dict(scenario.parameters.get("optimizer", {}))
         weights = values.pop("placement", {})
         self.settings = declare_settings(
@@ -120,6 +122,7 @@ class OptimizerNode(Node):
     def _take_up(self, belief: Belief) -> None:
         """Plan with what is believed of the object and the robots now."""
         self._item, self._robot = belief.object(self.object), belief.robot(self.robots[0])
+        self._believed = ContactBelief.of(belief, self.object)
         self._planner = None
 
     def _preempt(self) -> None:
@@ -201,7 +204,8 @@ class OptimizerNode(Node):
         goal = None if task else self._item.mass_pose(stamped_pose(request.goal, "the goal"))
         if self._planner is None:
             self._planner = StepPlanner(
-                self._grid, self._item, self._robot, self.settings, self._weights
+                *(self._grid, self._item, self._robot, self.settings, self._weights),
+                self._believed,
             )
             yield
         if task is not None:

@@ -10,12 +10,13 @@ below, and ``benchmarks/placement.py`` prints the gap and compares with far fine
 import itertools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from grasp_opt.contact_outline import ContactOutline, Contacts
+from grasp_opt.grasp_certificate import GraspCertificate
 from grasp_opt.object_trajectory import ObjectTrajectory
 from grasp_opt.placement_settings import PlacementSettings as PlacementSettings
 from grasp_opt.slices import Work, finish
@@ -23,6 +24,7 @@ from grasp_opt.tracking_cost import placement_cost
 from grasp_opt.wrench_cone import HELD, margin, margins, task_wrenches, wrench_rays
 from push_model.arrays import Array, Mask
 from push_model.specs import ObjectSpec
+from push_model.stick_certificate import ContactBelief
 
 _GRID = {1: 96, 2: 60, 3: 24, 4: 16, 5: 13}  # places about the outline, by the number of robots
 _CENTRES = {1: 1, 2: 96, 3: 60, 4: 60, 5: 60}  # of rows of robots side by side
@@ -33,7 +35,6 @@ _LOOSE, _TIGHT = 1e-4, 1e-7  # relative gaps of costs, on the grid and after it
 _COARSE, _FINEST = 4e-3, 2e-4  # [m] of the refinement, of all and of the best of them
 _WORTH, _FINALLY = 1e-3, 1e-6  # of the cost that a step must save, likewise
 _LAST = 3  # refined to the end
-_MARGINS = (0.1, 0.05, 0.0)  # that are asked for, one after another
 _HELD_AGAINST = 4000  # of the cheapest candidates, to find some that hold the task
 _GOLDEN = 0.6180339887498949
 _SLICE = 100  # placements that are looked at in one slice of the work
@@ -48,9 +49,9 @@ class NoPlacement(Exception):
 class Placement:
     """Where robots push and what it costs.
 
-    way ``(n,)`` [m] along the outline, in the order of the outline; contacts; cost of (3.16);
-    forces ``(N, n, 2)`` [N] in the object's frame; errors ``(N, 3)`` of the pose that remain;
-    margin: of the grasp-task compatibility test.
+    way ``(n,)`` [m] along the outline, in its order; contacts; cost of (3.16); forces ``(N, n, 2)``
+    [N] in the object's frame; errors ``(N, 3)`` of the pose that remain; margin: of the grasp-task
+    compatibility test.
     """
 
     way: Array
@@ -80,9 +81,11 @@ class Placer:
         settings: PlacementSettings | None = None,
         free: Callable[[Array], Mask] | None = None,
         candidates: Array | None = None,
+        believed: ContactBelief | None = None,
     ) -> None:
         """free: tells of ways ``(n,)`` along the outline where a robot has room. candidates
         ``(k, n)``: those of another task of as many robots in the same room, where they are known.
+        believed: what the task must be held for, if not only for the values of ``item``.
 
         Raises ValueError for a number of robots that is not 1 to 5."""
         if count not in _GRID:
@@ -98,6 +101,7 @@ class Placer:
         size = np.linalg.norm(twists, axis=1)
         self._moving = _different(twists[size > 0.0] / size[size > 0.0, None])
         self._wrenches = task_wrenches(self._moving, surface, surface.radius)
+        self._certificate = believed and GraspCertificate(item, believed, self._moving)
         at = np.linspace(0.0, trajectory.duration, s.steps + 1)
         poses = np.array([trajectory.sample(t) for t in at])
         self.steps = np.diff(poses, axis=0)
@@ -155,6 +159,8 @@ class Placer:
         if s.only_pushing and not self.pushes(way):
             return False
         if s.least_margin > -1.0 and self.margin(self.outline.at(way)) < s.least_margin - HELD:
+            return False
+        if self._certificate and self._certificate.margin(self.outline.at(way)) < 0.0:
             return False
         if s.most_force >= 1e6:
             return True
@@ -340,47 +346,6 @@ class Placer:
             np.cumsum(world - self.steps, axis=0),
             self.margin(contacts),
         )
-
-
-def robust_placement(
-    item: ObjectSpec,
-    trajectory: ObjectTrajectory,
-    count: int,
-    radius: float,
-    most_force: float,
-    settings: PlacementSettings | None = None,
-) -> Placement:
-    """``robust_search`` at once."""
-    return finish(robust_search(item, trajectory, count, radius, most_force, settings))
-
-
-def robust_search(
-    item: ObjectSpec,
-    trajectory: ObjectTrajectory,
-    count: int,
-    radius: float,
-    most_force: float,
-    settings: PlacementSettings | None = None,
-    free: Callable[[Array], Mask] | None = None,
-) -> Work[Placement]:
-    """The best placement for robots that correct errors as they push: with a margin of up
-    to 0.1 as far as there is one, all of them pushing, and none with more than ``most_force`` [N].
-
-    Raises
-    ------
-    NoPlacement: none holds the task at all.
-    """
-    settings, candidates = settings or PlacementSettings(), None
-    for least in _MARGINS:
-        asked = replace(settings, least_margin=least, only_pushing=True, most_force=most_force)
-        placer = Placer(item, trajectory, count, radius, asked, free, candidates)
-        candidates = yield from placer.candidates()
-        try:
-            return (yield from placer.search())
-        except NoPlacement:
-            if least == _MARGINS[-1]:
-                raise
-    raise AssertionError("unreachable")
 
 
 def _different(rows: Array) -> Array:

@@ -13,6 +13,7 @@ from push_model.belief import Belief
 from push_model.jobs import JobError
 from push_model.occupancy import OccupancyGrid
 from push_model.specs import ObjectSpec, RobotSpec
+from push_model.stick_certificate import ContactBelief
 
 
 class PlanFailed(Exception):
@@ -62,14 +63,14 @@ class InlinePlans:
         self._grid, self._names, self._settings = grid, (item, robot), settings
         self._placement = placement
         self._planner: StepPlanner | None = None
-        self._specs: tuple[ObjectSpec, RobotSpec] | None = None
+        self._specs: tuple[ObjectSpec, RobotSpec, ContactBelief | None] | None = None
         self._asked: tuple[Request, Seen] | None = None
         self.cost = 0.0
 
     def ask(self, request: Request, seen: Seen, belief: Belief) -> None:
         """See PlanSource."""
         item, robot = self._names
-        specs = belief.object(item), belief.robot(robot)
+        specs = belief.object(item), belief.robot(robot), ContactBelief.of(belief, item)
         if specs != self._specs:
             self._specs, self._planner = specs, None
         self._asked = request, seen
@@ -81,8 +82,10 @@ class InlinePlans:
         (request, at), self._asked = self._asked, None
         began = time.thread_time()
         if self._planner is None:
-            item, robot = self._specs
-            self._planner = StepPlanner(self._grid, item, robot, self._settings, self._placement)
+            item, robot, believed = self._specs
+            self._planner = StepPlanner(
+                self._grid, item, robot, self._settings, self._placement, believed
+            )
         rest = (request.robots, request.dead, at.obstacles, request.fewest)
         try:
             if request.trajectory is not None:

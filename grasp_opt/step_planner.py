@@ -10,14 +10,15 @@ import numpy as np
 
 from grasp_opt.contact_outline import ContactOutline
 from grasp_opt.detours import Detours, Holding, size
+from grasp_opt.grasp_certificate import GraspCertificate
 from grasp_opt.object_trajectory import ObjectTrajectory, screw
 from grasp_opt.placement import (
     NoPlacement,
     Placement,
     PlacementSettings,
     Placer,
-    robust_search,
 )
+from grasp_opt.robust_placement import robust_search
 from grasp_opt.sequencing import LEAST_BACK, Move, NoStep, Sequencer, standoffs
 from grasp_opt.slices import Work, finish
 from grasp_opt.step_settings import StepSettings
@@ -28,6 +29,7 @@ from push_model.object_way import NoObjectWay, WayFinder, pieces
 from push_model.occupancy import OccupancyGrid
 from push_model.screws import point_velocities, screw_poses
 from push_model.specs import ObjectSpec, RobotSpec
+from push_model.stick_certificate import ContactBelief
 from push_model.traction import lift_share, push_force, standing_traction
 
 _MOST = 5  # robots that are placed at once
@@ -107,13 +109,15 @@ class StepPlanner:
         robot: RobotSpec,
         settings: StepSettings | None = None,
         placement: PlacementSettings | None = None,
+        believed: ContactBelief | None = None,
     ) -> None:
         """item, robot: as believed. placement: of trajectories that are given; pieces of the way
-        to a goal have fewer steps."""
+        to a goal have fewer steps. believed: intervals, if anything uncertain is believed."""
         self.settings = s = settings or StepSettings()
         self._weights = placement or PlacementSettings()
         self._placement = replace(self._weights, steps=s.steps, gap=s.gap)
         self._space, self._item, self._robot = FreeSpace(grid), item, robot
+        self._believed = believed
         self._outline = ContactOutline(item.geometry)
         self._shape = item.geometry.outline
         self._radius = robot.footprint_radius
@@ -286,9 +290,10 @@ class StepPlanner:
         for count in (*range(fewest, most + 1), *range(fewest - 1, least - 1, -1)):
             try:
                 placement = yield from robust_search(
-                    self._item, piece.trajectory, count, self._radius, self.force, weights, free
+                    *(self._item, piece.trajectory, count, self._radius, self.force, weights),
+                    *(free, self._believed),
                 )
-                if placement.margin < s.margin - 1e-9:
+                if placement.margin < s.margin - 1e-9 and not self._certain(placement, piece):
                     doubtful.append(placement)
                     continue
                 return (yield from self._with_moves(scene, piece, placement))
@@ -302,6 +307,13 @@ class StepPlanner:
             except NoStep as error:
                 why = error
         raise NoStep(str(why))
+
+    def _certain(self, placement: Placement, piece: _Piece) -> bool:
+        """Whether a placement holds its task for all that is believed."""
+        if self._believed is None:
+            return False
+        certificate = GraspCertificate(self._item, self._believed, piece.trajectory.body_twists)
+        return certificate.margin(placement.contacts) >= 0.0
 
     def _free(self, scene: Scene, piece: _Piece, way: Array) -> Mask:
         """Where along the outline, of ways ``(n,)`` [m], a robot has room all along a push, and on

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from grasp_opt.object_trajectory import screw
-from grasp_opt.placement import NoPlacement, PlacementSettings, robust_placement
+from grasp_opt.placement import NoPlacement, PlacementSettings
+from grasp_opt.robust_placement import robust_placement
 from push_model import object_way
 from push_model.specs import ObjectSpec, RobotSpec
 

@@ -12,8 +12,9 @@ import numpy as np
 from grasp_opt.group_job import Request
 from grasp_opt.group_method import SECTIONS, GroupMethod, check_team
 from grasp_opt.object_trajectory import ObjectTrajectory
-from grasp_opt.placement import NoPlacement, robust_placement
+from grasp_opt.placement import NoPlacement
 from grasp_opt.plan_source import PlanFailed
+from grasp_opt.robust_placement import robust_placement
 from grasp_opt.selection import GraspSelector, NoGraspFound, Selection
 from grasp_opt.sequencing import NoStep
 from grasp_opt.step_planner import GroupPlan, StepPlanner

@@ -10,8 +10,9 @@ from grasp_opt.group_control import GroupControlSettings
 from grasp_opt.group_job import GroupJob
 from grasp_opt.group_push import GroupPush, Phase
 from grasp_opt.object_trajectory import polynomial, screw
-from grasp_opt.placement import PlacementSettings, robust_placement
+from grasp_opt.placement import PlacementSettings
 from grasp_opt.prediction import GroupPrediction
+from grasp_opt.robust_placement import robust_placement
 from grasp_opt.step_planner import StepPlanner
 from push_estimation.dead_reckoning import twist_step
 from push_model.jobs import JobError

@@ -8,9 +8,10 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from grasp_opt.object_trajectory import polynomial, study_trajectories
-from grasp_opt.placement import NoPlacement, PlacementSettings, Placer, robust_placement
+from grasp_opt.placement import NoPlacement, PlacementSettings, Placer
 from grasp_opt.placement_bound import PlacementBound
 from grasp_opt.placement_nlp import LocalPlacer
+from grasp_opt.robust_placement import robust_placement
 from push_model.shape_specs import RectangleShape
 from push_scenario.bodies import load_object
 

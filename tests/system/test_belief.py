@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
+from grasp_opt.grasp_certificate import GraspCertificate
 from push_model.belief import Interval
-from push_msgs.msg import Belief, JobState
-from push_ros.qos import BELIEF
-from push_ros.report_conversions import belief_to_ros
+from push_model.stick_certificate import ContactBelief
+from push_msgs.msg import Belief, JobState, Report
+from push_ros.qos import BELIEF, STATUS
+from push_ros.report_conversions import belief_to_ros, report_from_ros
 from push_scenario.scenario import load_scenario, scenario_from_mapping
 from push_study.graph_run import LockstepRun
 
@@ -102,7 +104,7 @@ def test_what_cannot_be_believed_is_refused_and_changes_nothing(single):
     assert message.source == "person"
 
 
-def test_a_group_pushes_on_with_the_friction_that_it_is_told():
+def group_scenario():
     values = {
         "environment": "open",
         "robots": {
@@ -112,7 +114,40 @@ def test_a_group_pushes_on_with_the_friction_that_it_is_told():
         "objects": {"plate": {"type": "plate_ellipse", "start": [0.0, 0.0, 0.0]}},
         "parameters": {"bridge": {"world": "planar"}},
     }
-    scenario = scenario_from_mapping(values, "group", "test")
+    return scenario_from_mapping(values, "group", "test")
+
+
+def test_a_group_is_placed_by_the_certified_margin_and_tells_it():
+    scenario = group_scenario()
+    mu = scenario.objects["plate"][0].contact_friction
+    with LockstepRun(scenario, quiet=True, system="group") as run:
+        run.start()
+        told = []
+        run.observer.create_subscription(Report, "/report", told.append, STATUS)
+        tell(run, {("plate", "contact_friction"): (mu, 0.7 * mu, 1.2 * mu)})
+        pushing(run, (0.5, 0.3, 0.4))
+        method = run.supervisor.method
+        assert run.spin_until(lambda: method.job.last is not None, 5.0)
+        twists, contacts = (
+            method.job.plan.trajectory.body_twists,
+            method.job.plan.placement.contacts,
+        )
+        believed = ContactBelief(Interval(mu, 0.7 * mu, 1.2 * mu), *[Interval.exact(0.0)] * 2)
+        item = scenario.objects["plate"][0]
+        sure = GraspCertificate(item, believed, twists).margin(contacts)
+        begin = run.bridge.time
+        run.spin_until(lambda: run.bridge.time > begin + 0.5, 2.0)
+        last = report_from_ros(told[-1])
+        assert 0.0 <= sure == pytest.approx(last.figure("certified margin"))
+        assert sure < last.figure("grasp margin")
+        tell(run, {("plate", "contact_friction"): (mu, 0.3 * mu, 1.2 * mu)})
+        begin = run.bridge.time
+        run.spin_until(lambda: run.bridge.time > begin + 0.5, 2.0)
+        assert report_from_ros(told[-1]).figure("certified margin") < sure
+
+
+def test_a_group_pushes_on_with_the_friction_that_it_is_told():
+    scenario = group_scenario()
     with LockstepRun(scenario, quiet=True, system="group") as run:
         run.start()
         pushing(run, (0.5, 0.3, 0.4))
@@ -122,6 +157,7 @@ def test_a_group_pushes_on_with_the_friction_that_it_is_told():
         tell(run, {("plate", "contact_friction"): (0.05, 0.04, 0.06)})
         controller = job._step.push.controller
         assert controller.friction == 0.05 and run.planner._item.contact_friction == 0.05
+        assert run.planner._believed.friction == Interval(0.05, 0.04, 0.06)
         after = job.last.command
         inward = (after.forces * after.contacts.normals).sum(axis=1)
         normals = after.contacts.normals
