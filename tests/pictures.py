@@ -25,6 +25,7 @@ RUNS = (
     ("single", "env1-target1", ("env1-target1.png", "env1-target1.gif")),
     ("single", "env2-target2", ("env2-target2.png",)),
     ("single", "env3-target2", ("env3-target2.png",)),
+    ("single", "beside-wall", ("beside-wall.png",)),
     ("group", "group-ellipse", ("group-ellipse.png", "group-ellipse.gif")),
     ("swarm", "swarm-square", ("swarm-square.gif",)),
     ("swarm", "swarm-walls", ("swarm-walls.gif",)),
