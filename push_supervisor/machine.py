@@ -263,10 +263,9 @@ class Machine:
         self._say(commands.FollowRetreat())
 
     def _push(self) -> None:
-        self._enter(
-            State.PUSHING,
-            f"push {self.index + 1} of {len(self.segments)} on side {self.segment.side}",
-        )
+        where = "a corner" if self.segment.turns else f"side {self.segment.side}"
+        number = f"{self.index + 1} of {len(self.segments)}"
+        self._enter(State.PUSHING, f"push {number} on {where}")
         follow = commands.FollowTurn if self.segment.turns else commands.FollowPush
         self._say(follow(self.segment))
 
@@ -278,7 +277,7 @@ class Machine:
             self._backed_off()
             return
         if self.segment.turns:
-            self._replan("the object was turned, and may be anywhere near", backed_off=True)
+            self._replan("a push on a corner has turned the object", backed_off=True)
             return
         self.index += 1
         if self.index < len(self.segments):
