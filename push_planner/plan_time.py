@@ -45,7 +45,7 @@ class PlanTime:
         side and clear of it, in the frame of the outline, by the index of the side."""
         drive = robot.differential
         self._top, self._half = (1.0 - settings.wheel_reserve) * drive.max_speed, drive.half_track
-        self._speed = settings.push_speed
+        self._speed, self._contact_time = settings.push_speed, settings.contact_time
         speed = min(self._speed, self._top)
         self.pace, self.begin = 1.0 / speed, speed / settings.push_acceleration
         corners = tuple((float(x), float(y)) for x, y in outline)
@@ -69,12 +69,13 @@ class PlanTime:
         """
         total = 0.0
         for s in segments:
-            total += self.of_push(
-                PushCurve(s.robot_start, s.robot_end, s.k_start, s.k_end, s.length)
-            )
+            curve = PushCurve(s.robot_start, s.robot_end, s.k_start, s.k_end, s.length)
+            total += float(s.trajectory.time[-1]) if s.turns else self.of_push(curve)
         for before, after in zip(segments, segments[1:], strict=False):
             numbers = self._numbers[before.side], self._numbers[after.side]
-            total += change_weight * float(self.changes[numbers])
+            change = float(self.changes[numbers])
+            # After a push on a corner the robot backs off, also if it goes on on the same side.
+            total += change_weight * max(change, before.turns * self._contact_time)
         return total
 
 

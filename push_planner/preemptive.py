@@ -127,8 +127,9 @@ def plan_after_preemptive_push(
 
 def _preceded(planner: PushPlanner, first: PushSegment, plan: PushPlan, least: float) -> PushPlan:
     """A plan with a push before it, at the cost that the search would give it. least: [s] bound on
-    the cost of any plan."""
+    the cost of any plan of stable pushes; it says nothing of a push on a corner."""
     clearance = min(first.clearance, plan.clearance)
     segments = (first, *plan.segments)
     cost = planner.scene.time.of_plan(segments)
-    return replace(plan, segments=segments, cost=cost, cost_bound=least, clearance=clearance)
+    bound = 0.0 if first.turns else least
+    return replace(plan, segments=segments, cost=cost, cost_bound=bound, clearance=clearance)

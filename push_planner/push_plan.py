@@ -45,8 +45,8 @@ class PlanStatistics:
 
 @dataclass(frozen=True)
 class PushPlan:
-    """cost [s]: g(q) of (2.10), see plan_time.py; cost_bound [s]: no plan costs less; clearance
-    [m]; the guide path used.
+    """cost [s]: g(q) of (2.10), see plan_time.py; cost_bound [s]: no plan of stable pushes
+    costs less, 0 if unknown; clearance [m]; the guide path used.
 
     goal ``(3,)`` and the segments' poses are of the object's geometric frame, the guide path is of
     its centre of mass.

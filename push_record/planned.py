@@ -45,7 +45,7 @@ def from_push_plan(message: Any, time: float) -> Plan:
     """Of push_msgs/PushPlan: the pushes of one robot."""
     pushes = [
         PlannedPush(
-            f"push {i + 1}: side {s.side}",
+            f"push {i + 1}: " + ("a corner" if getattr(s, "turns", False) else f"side {s.side}"),
             int(s.side),
             _points(s.trajectory.x, s.trajectory.y),
         )
