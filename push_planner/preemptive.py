@@ -20,7 +20,7 @@ from push_planner.push_graph import PushStep
 from push_planner.push_plan import PlanError, PlanningFailed, Progress, PushPlan
 from push_planner.refusal import check_way
 from push_planner.robot_path import has_way
-from push_planner.turning_push import turning_pushes
+from push_planner.turning_push import turning_search
 
 
 def preemptive_pushes(
@@ -93,9 +93,15 @@ def plan_after_preemptive_push(
     planner.check(goal, "goal", PlanError.GOAL_OCCUPIED)
     offers = preemptive_pushes(planner, start, goal, seed, robot=robot)
     offers = offers[: planner.settings.max_preemptive]
-    yield Progress("pushes that turn the object", None)
     centre, most = planner.scene.item.mass_pose(start), planner.settings.max_turning
-    offers += turning_pushes(planner.scene, centre, robot, most)
+    search = turning_search(planner.scene, centre, robot, most)
+    while True:
+        try:
+            next(search)
+        except StopIteration as end:
+            offers += end.value
+            break
+        yield Progress("pushes on a corner", None)
     if not offers:
         check_way(planner.scene, start, robot)
     yield Progress("pre-emptive pushes", None)

@@ -8,7 +8,7 @@ Poses are of the object's centre of mass here, as in ``PushScene``.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,7 +55,21 @@ class _Offer:
 def turning_pushes(
     scene: PushScene, start: Array, robot: Array | None, most: int
 ) -> list[PushSegment]:
-    """Pushes on a corner of an object at ``start`` ``(3,)``, the most promising ones first.
+    """``turning_search`` at once."""
+    search = turning_search(scene, start, robot, most)
+    while True:
+        try:
+            next(search)
+        except StopIteration as end:
+            found: list[PushSegment] = end.value
+            return found
+
+
+def turning_search(
+    scene: PushScene, start: Array, robot: Array | None, most: int
+) -> Generator[None, None, list[PushSegment]]:
+    """Pushes on a corner of an object at ``start`` ``(3,)``, the most promising ones first; in
+    slices.
 
     Parameters
     ----------
@@ -67,9 +81,13 @@ def turning_pushes(
     Pushes after which more sides have room come first, then those that turn the object more. Empty
     for an object that is not convex.
     """
-    if not scene.shape.convex:
+    if not scene.shape.convex or most == 0:
         return []
-    found = sorted(_offers(scene, start), key=lambda o: (-o.sides, -o.turned))
+    found: list[_Offer] = []
+    for heading in np.arange(_HEADINGS) * (2.0 * np.pi / _HEADINGS):
+        found += _offers(scene, start, float(heading))
+        yield
+    found.sort(key=lambda o: (-o.sides, -o.turned))
     outline = se2.transform(start, scene.shape.outline)
     ways = scene.field, scene.robot, scene.settings
     chosen: list[_Offer] = []
@@ -84,7 +102,8 @@ def turning_pushes(
     return [_segment(scene, start, offer) for offer in chosen]
 
 
-def _offers(scene: PushScene, start: Array) -> Iterator[_Offer]:
+def _offers(scene: PushScene, start: Array, heading: float) -> Iterator[_Offer]:
+    """The pushes that can be made with a heading [rad] of the robot."""
     bumper, item = scene.robot.flat_bumper, scene.item
     half, face = 0.5 * bumper.width, scene.robot.push_distance
     radius = item.limit_surface().radius
@@ -92,36 +111,35 @@ def _offers(scene: PushScene, start: Array) -> Iterator[_Offer]:
     leaving = scene.leaving(start)
     keeps = scene.robot_keeps(leaving)
     outline = scene.shape.outline
-    for heading in np.arange(_HEADINGS) * (2.0 * np.pi / _HEADINGS):
-        for place in _PLACES:
-            relative = float(start[2]) - heading
-            at = touching(outline, relative, face, place * half)
-            begin = se2.compose(start, se2.inverse(at))
-            back = scene.room_to_back_off(begin, leaving)
-            if back is None:
-                continue
-            pushes = [
-                corner_push(outline, at + [0.0, aside, 0.0], face, half, friction, radius, _MOST)
-                for friction in frictions
-                for aside in (0.0, -_ASIDE, _ASIDE)
-            ]
-            first = pushes[0]
-            if first is None or abs(float(first.poses[-1, 2] - relative)) < _LEAST:
-                continue
-            side = _flush(scene.sides, first)
-            known = [push for push in pushes if push is not None]
-            if side is None or len(known) < len(pushes):
-                continue
-            length = float(first.travel[-1])
-            room = _clearance(scene, begin, known, length, min(leaving, keeps), keeps)
-            if room is None:
-                continue
-            end = se2.compose(begin, np.array([length, 0.0, 0.0]))
-            after = se2.compose(end, first.poses[-1])
-            there = scene.leaving(after)
-            sides = sum(scene.has_room(s.robot_pose(after), s, there) for s in scene.sides)
-            standoff = se2.compose(begin, np.array([-back, 0.0, 0.0]))
-            yield _Offer(begin, standoff, first, after, side, room, sides)
+    for place in _PLACES:
+        relative = float(start[2]) - heading
+        at = touching(outline, relative, face, place * half)
+        begin = se2.compose(start, se2.inverse(at))
+        back = scene.room_to_back_off(begin, leaving)
+        if back is None:
+            continue
+        pushes = [
+            corner_push(outline, at + [0.0, aside, 0.0], face, half, friction, radius, _MOST)
+            for friction in frictions
+            for aside in (0.0, -_ASIDE, _ASIDE)
+        ]
+        first = pushes[0]
+        if first is None or abs(float(first.poses[-1, 2] - relative)) < _LEAST:
+            continue
+        side = _flush(scene.sides, first)
+        known = [push for push in pushes if push is not None]
+        if side is None or len(known) < len(pushes):
+            continue
+        length = float(first.travel[-1])
+        room = _clearance(scene, begin, known, length, min(leaving, keeps), keeps)
+        if room is None:
+            continue
+        end = se2.compose(begin, np.array([length, 0.0, 0.0]))
+        after = se2.compose(end, first.poses[-1])
+        there = scene.leaving(after)
+        sides = sum(scene.has_room(s.robot_pose(after), s, there) for s in scene.sides)
+        standoff = se2.compose(begin, np.array([-back, 0.0, 0.0]))
+        yield _Offer(begin, standoff, first, after, side, room, sides)
 
 
 def _flush(sides: Sequence[PushSide], push: CornerPush) -> PushSide | None:
