@@ -13,13 +13,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
+_PREFIX = "planar_push_"
 _claims: dict[int, IO[str]] = {}
 _turns = itertools.count()
 
 
 def _locked(name: str) -> IO[str] | None:
     """The file of a claim; None where somebody else has it."""
-    path = Path(tempfile.gettempdir()) / f"planar_push_{name}.lock"
+    path = Path(tempfile.gettempdir()) / f"{_PREFIX}{name}.lock"
     try:
         file = open(path, opener=_open)  # noqa: SIM115  (it stays open)
     except OSError:
@@ -54,8 +55,20 @@ def world_is_claimed(domain: str, space: str) -> bool:
     return False
 
 
+def _has_world(domain: int) -> bool:
+    """Whether a process on this machine is a world in a domain, of any namespace."""
+    files = Path(tempfile.gettempdir()).glob(f"{_PREFIX}world_{domain}-*.lock")
+    for name in (file.stem.removeprefix(_PREFIX) for file in files):
+        claim = _locked(name)
+        if claim is None:
+            return True
+        claim.close()
+    return False
+
+
 def claim_domain() -> int:
-    """Set ROS_DOMAIN_ID to one that no other run on this machine has claimed; returns it.
+    """Set ROS_DOMAIN_ID to one that no other run on this machine has claimed, and in which no suite
+    runs; returns it.
 
     The claim is a locked file, held until it is released or this process ends. Two lockstep runs on
     one domain would answer each other's frames. A domain that was released is not taken again at
@@ -65,6 +78,9 @@ def claim_domain() -> int:
         domain = 1 + (os.getpid() + next(_turns)) % 100
         file = _locked(f"domain_{domain}")
         if file is None:
+            continue
+        if _has_world(domain):
+            file.close()
             continue
         _claims[domain] = file
         os.environ["ROS_DOMAIN_ID"] = str(domain)

@@ -132,6 +132,20 @@ def test_a_domain_is_given_back(domain, monkeypatch):
     assert "ROS_DOMAIN_ID" not in os.environ
 
 
+def test_a_domain_of_its_own_is_none_in_which_a_suite_runs(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    claims = [claim_world(str(d), "/lab") for d in range(1, 101) if d != 42]
+    try:
+        with own_domain() as own:
+            assert own == 42
+        claims.append(claim_world("42", "/"))
+        with pytest.raises(RuntimeError, match="in use"), own_domain():
+            pass
+    finally:
+        for claim in claims:
+            claim.close()
+
+
 def test_the_world_of_a_namespace_is_claimed_by_one_at_a_time(domain):
     name = str(domain)
     claim = claim_world(name, "/lab/")
