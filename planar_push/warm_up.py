@@ -16,11 +16,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Use each kernel once, as the nodes of every system do when they start and get a goal."""
-    print("compiling the numerical kernels")
-    _one_robot()
-    _torque()
-    _placements()
-    _methods()
+    parts = {
+        "one robot": _one_robot,
+        "torque-driven robot": _torque,
+        "placements of a group": _placements,
+        "group and swarm": _methods,
+    }
+    for number, (name, compile_part) in enumerate(parts.items(), 1):
+        print(f"compiling the numerical functions, {number} of {len(parts)}: {name}", flush=True)
+        compile_part()
     return 0
 
 
