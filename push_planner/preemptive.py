@@ -93,7 +93,8 @@ def plan_after_preemptive_push(
     planner.check(goal, "goal", PlanError.GOAL_OCCUPIED)
     offers = preemptive_pushes(planner, start, goal, seed, robot=robot)
     offers = offers[: planner.settings.max_preemptive]
-    centre, most = planner.scene.item.mass_pose(start), planner.settings.max_turning
+    settings, centre = planner.settings, planner.scene.item.mass_pose(start)
+    most = settings.max_turning if settings.planner == "lazy" else 0  # not in the thesis
     search = turning_search(planner.scene, centre, robot, most)
     while True:
         try:

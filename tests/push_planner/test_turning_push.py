@@ -91,8 +91,9 @@ def test_an_object_that_no_push_leads_away_is_turned_first(planner):
     assert plan.cost_bound == 0.0, "the bound knows stable pushes only"
 
 
-def test_without_them_it_is_refused(scenario, robot, box):
-    planner = PushPlanner(PlannerSettings(max_turning=0), scenario.grid, robot, box)
+@pytest.mark.parametrize("changes", [{"max_turning": 0}, {"planner": "thesis"}])
+def test_without_them_it_is_refused(scenario, robot, box, changes):
+    planner = PushPlanner(PlannerSettings(**changes), scenario.grid, robot, box)
     with pytest.raises(PlanningFailed, match="pre-emptive"):
         last(plan_after_preemptive_push(planner, STUCK, GOAL, 1))
 
