@@ -51,6 +51,7 @@ class GroupMethod:
             InlinePlans(arena.grid, arena.object, self._names[0]) if source is None else source
         )
         self._asked: Request | None = None
+        self._planned_for = arena.item  # as believed when the push under way was planned
         self._believed: ContactBelief | None = None
         self._known: tuple[GroupPlan, ContactBelief, float] | None = None  # of the last push
         self._finder = WayFinder(FreeSpace(arena.grid), arena.item.geometry.outline, 0.0)
@@ -157,6 +158,7 @@ class GroupMethod:
             return self._plans.cost
         if plan is None:
             return 0.0
+        self._planned_for = self._item
         self.job.planned(plan)
         return self._plans.cost
 
@@ -201,7 +203,7 @@ class GroupMethod:
         known = self._known
         if known is None or known[0] is not plan or known[1] != believed:
             twists = plan.trajectory.body_twists
-            certificate = GraspCertificate(self._item, believed, twists)
+            certificate = GraspCertificate(self._planned_for, believed, twists)
             known = self._known = plan, believed, certificate.margin(plan.placement.contacts)
         return known[2]
 

@@ -158,9 +158,10 @@ class Placer:
         s = self.settings
         if s.only_pushing and not self.pushes(way):
             return False
-        if s.least_margin > -1.0 and self.margin(self.outline.at(way)) < s.least_margin - HELD:
+        contacts = self.outline.at(way)
+        if s.least_margin > -1.0 and self.margin(contacts) < s.least_margin - HELD:
             return False
-        if self._certificate and self._certificate.margin(self.outline.at(way)) < 0.0:
+        if self._certificate and self._certificate.margin(contacts) < 0.0:
             return False
         if s.most_force >= 1e6:
             return True

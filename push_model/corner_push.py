@@ -27,19 +27,16 @@ import numpy as np
 from push_model.arrays import Array
 
 _STEP = 5e-4  # [m] of travel
-_FLUSH = 1e-9  # [m]
+_FLUSH = 1e-9  # [rad] to the bumper, from which on a side is flush
 
 
 @dataclass(frozen=True)
 class CornerPush:
     """The motion of the object. poses: ``(n, 3)`` in the frame of the robot, which has moved
-    ``travel`` ``(n,)`` [m]; at the last one a side is flush. right, left: [m] ends of the contact
-    then, from the middle of the bumper, positive to the left."""
+    ``travel`` ``(n,)`` [m]; at the last one a side is flush."""
 
     poses: Array
     travel: Array
-    right: float
-    left: float
 
 
 def touching(outline: Array, heading: float, face: float, corner: float) -> Array:
@@ -76,18 +73,16 @@ def corner_push(
         surface. most: [m] of travel.
     """
     poses = np.empty((int(most / _STEP) + 2, 3))
-    count, right, left = _follow(outline, start, face, half_width, friction, radius**2, poses)
-    if count == 0:
-        return None
-    return CornerPush(poses[:count].copy(), _STEP * np.arange(count), right, left)
+    count = _follow(outline, start, face, half_width, friction, radius**2, poses)
+    return CornerPush(poses[:count].copy(), _STEP * np.arange(count)) if count else None
 
 
 @numba.njit(cache=True)
 def _follow(
     outline: Any, start: Any, face: float, half: float, friction: float, square: float, poses: Any
-) -> Any:
-    """Number of poses until a side is flush, and the ends of the contact; 0 if none gets flush."""
-    x, y, theta = start[0], start[1], start[2]
+) -> int:
+    """Number of poses until a side is flush; 0 if none gets flush."""
+    y, theta = start[1], start[2]
     n = outline.shape[0]
     for k in range(poses.shape[0]):
         c, s = math.cos(theta), math.sin(theta)
@@ -98,10 +93,9 @@ def _follow(
         # The corner is at the face; a step leaves an error of second order.
         rx = c * outline[rear, 0] - s * outline[rear, 1]
         ry = s * outline[rear, 0] + c * outline[rear, 1]
-        x = face - rx
-        poses[k, 0], poses[k, 1], poses[k, 2] = x, y, theta
+        poses[k, 0], poses[k, 1], poses[k, 2] = face - rx, y, theta
         if abs(y + ry) > half:
-            return 0, 0.0, 0.0
+            return 0
         a, b = 1.0 + ry * ry / square, 1.0 + rx * rx / square
         d = -rx * ry / square
         # The force that moves the corner straight ahead is that of M f = (1, 0), up to a factor.
@@ -111,23 +105,20 @@ def _follow(
         ahead = a * fx + d * fy
         turn = (rx * fy - ry * fx) / square / ahead
         across = fy / ahead
+        if turn == 0.0:
+            return 0
         # Of the two neighbours, the one that comes nearer.
         following = (rear + 1) % n if turn < 0.0 else (rear + n - 1) % n
         ex, ey = outline[following, 0] - outline[rear, 0], outline[following, 1] - outline[rear, 1]
         gap = c * ex - s * ey
         away = s * ex + c * ey
-        if turn == 0.0:
-            return 0, 0.0, 0.0
         left_to_turn = math.atan2(gap, abs(away))
         if left_to_turn <= abs(turn) * _STEP + _FLUSH:
             theta += math.copysign(left_to_turn, turn)
             c, s = math.cos(theta), math.sin(theta)
             rx = c * outline[rear, 0] - s * outline[rear, 1]
-            ry = s * outline[rear, 0] + c * outline[rear, 1]
-            away = s * ex + c * ey
             poses[k, 0], poses[k, 2] = face - rx, theta
-            one, other = y + ry, y + ry + away
-            return k + 1, max(-half, min(one, other)), min(half, max(one, other))
+            return k + 1
         y += across * _STEP
         theta += turn * _STEP
-    return 0, 0.0, 0.0
+    return 0

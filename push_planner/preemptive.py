@@ -95,14 +95,7 @@ def plan_after_preemptive_push(
     offers = offers[: planner.settings.max_preemptive]
     settings, centre = planner.settings, planner.scene.item.mass_pose(start)
     most = settings.max_turning if settings.planner == "lazy" else 0  # not in the thesis
-    search = turning_search(planner.scene, centre, robot, most)
-    while True:
-        try:
-            next(search)
-        except StopIteration as end:
-            offers += end.value
-            break
-        yield Progress("pushes on a corner", None)
+    offers += yield from turning_search(planner.scene, centre, robot, most)
     if not offers:
         check_way(planner.scene, start, robot)
     yield Progress("pre-emptive pushes", None)

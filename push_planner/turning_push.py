@@ -18,6 +18,7 @@ from push_model.arrays import Array
 from push_model.corner_push import CornerPush, corner_push, touching
 from push_model.push_segment import PushSegment
 from push_model.trajectory import line
+from push_planner.push_plan import Progress
 from push_planner.robot_path import has_way
 from push_planner.scene import PushScene, PushSide
 
@@ -52,22 +53,9 @@ class _Offer:
         return abs(float(self.push.poses[-1, 2] - self.push.poses[0, 2]))
 
 
-def turning_pushes(
-    scene: PushScene, start: Array, robot: Array | None, most: int
-) -> list[PushSegment]:
-    """``turning_search`` at once."""
-    search = turning_search(scene, start, robot, most)
-    while True:
-        try:
-            next(search)
-        except StopIteration as end:
-            found: list[PushSegment] = end.value
-            return found
-
-
 def turning_search(
     scene: PushScene, start: Array, robot: Array | None, most: int
-) -> Generator[None, None, list[PushSegment]]:
+) -> Generator[Progress, None, list[PushSegment]]:
     """Pushes on a corner of an object at ``start`` ``(3,)``, the most promising ones first; in
     slices.
 
@@ -86,7 +74,7 @@ def turning_search(
     found: list[_Offer] = []
     for heading in np.arange(_HEADINGS) * (2.0 * np.pi / _HEADINGS):
         found += _offers(scene, start, float(heading))
-        yield
+        yield Progress("pushes on a corner", None)
     found.sort(key=lambda o: (-o.sides, -o.turned))
     outline = se2.transform(start, scene.shape.outline)
     ways = scene.field, scene.robot, scene.settings
@@ -118,17 +106,17 @@ def _offers(scene: PushScene, start: Array, heading: float) -> Iterator[_Offer]:
         back = scene.room_to_back_off(begin, leaving)
         if back is None:
             continue
-        pushes = [
+        first = corner_push(outline, at, face, half, item.contact_friction, radius, _MOST)
+        if first is None or abs(float(first.poses[-1, 2] - relative)) < _LEAST:
+            continue
+        side = _flush(scene.sides, first)
+        others = [
             corner_push(outline, at + [0.0, aside, 0.0], face, half, friction, radius, _MOST)
             for friction in frictions
             for aside in (0.0, -_ASIDE, _ASIDE)
         ]
-        first = pushes[0]
-        if first is None or abs(float(first.poses[-1, 2] - relative)) < _LEAST:
-            continue
-        side = _flush(scene.sides, first)
-        known = [push for push in pushes if push is not None]
-        if side is None or len(known) < len(pushes):
+        known = [push for push in others if push is not None]
+        if side is None or len(known) < len(others):
             continue
         length = float(first.travel[-1])
         room = _clearance(scene, begin, known, length, min(leaving, keeps), keeps)

@@ -33,19 +33,23 @@ def approach(
     segment: PushSegment, robot: Array, item: Array, settings: SupervisorSettings
 ) -> Trajectory:
     """Straight on until contact, on the line through the contact pose; braking towards it."""
-    contact = segment.contact(item)
-    ahead = float(se2.between(robot, contact)[0])
-    begin = se2.compose(contact, np.array([-ahead, 0.0, 0.0]))
+    begin, ahead = _on_the_line(segment, robot, item)
     s = settings
     return line(begin, ahead, s.approach_speed, s.acceleration, braking=s.contact_braking)
 
 
 def turn(segment: PushSegment, robot: Array, item: Array, speed: float) -> Trajectory:
     """Straight on from contact with a corner, at up to a speed [m/s], as far as the push leads."""
+    begin, ahead = _on_the_line(segment, robot, item)
+    return line(begin, ahead + segment.length, speed, _TURN_ACCELERATION)
+
+
+def _on_the_line(segment: PushSegment, robot: Array, item: Array) -> tuple[Array, float]:
+    """Pose ``(3,)`` beside the robot on the line through the contact pose, and [m] from there to
+    contact."""
     contact = segment.contact(item)
     ahead = float(se2.between(robot, contact)[0])
-    begin = se2.compose(contact, np.array([-ahead, 0.0, 0.0]))
-    return line(begin, ahead + segment.length, speed, _TURN_ACCELERATION)
+    return se2.compose(contact, np.array([-ahead, 0.0, 0.0])), ahead
 
 
 def retreat(

@@ -42,7 +42,10 @@ class WallTask:
 
 
 def tasks(options: StudyOptions) -> list[WallTask]:
-    """Every scenario, as often as there are trials."""
+    """Every scenario, as often as there are trials. Raises SettingsError where the robot has no
+    flat bumper."""
+    for name in options.scenarios:
+        _ = load_scenario(name).robot()[1].flat_bumper
     return [
         WallTask(name, seed, options.uncertainty)
         for name in options.scenarios
@@ -56,7 +59,7 @@ def drawn_scenario(task: WallTask) -> tuple[Scenario, int]:
 
     Raises
     ------
-    SettingsError: nearly all poses were drawn in vain.
+    SettingsError: a million poses were drawn in vain.
     """
     scenario = load_scenario(task.scenario)
     random = np.random.default_rng([task.seed, zlib.crc32(scenario.name.encode()), 11])
@@ -64,12 +67,16 @@ def drawn_scenario(task: WallTask) -> tuple[Scenario, int]:
     item_name, item = scenario.object()
     planner = PushPlanner(PlannerSettings(), scenario.grid, robot, item)
     x0, x1, y0, y1 = scenario.grid.extent
-    scene, drawn = planner.scene, 0
+    scene, drawn, left = planner.scene, 0, _TRIES
 
     def pose() -> Array:
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise SettingsError(f"no start, goal and place of the robot found in '{task.scenario}'")
         return random.uniform([x0, y0, -np.pi], [x1, y1, np.pi])
 
-    for _ in range(_TRIES):
+    while True:
         start = pose()
         clearance = scene.object_clearance(item.mass_pose(start))
         if not scene.settings.safety_distance < clearance < CLOSE:
@@ -84,7 +91,6 @@ def drawn_scenario(task: WallTask) -> tuple[Scenario, int]:
         except PlanningFailed:
             robots, objects = {robot_name: (robot, beside)}, {item_name: (item, start)}
             return replace(scenario, robots=robots, objects=objects, goals=(goal,)), drawn
-    raise SettingsError(f"in '{task.scenario}' every start has a plan without pre-emptive pushes")
 
 
 def _goal(scene: PushScene, pose: Callable[[], Array]) -> Array:

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from benchmarks.plan import problems
+from grasp_opt.slices import finish
 from push_model import se2
 from push_model.occupancy import OccupancyGrid
 from push_model.outlines import overlap
 from push_planner import PlannerSettings, PlanningFailed, PushPlanner
 from push_planner.preemptive import plan_after_preemptive_push
-from push_planner.turning_push import turning_pushes
+from push_planner.turning_push import turning_search
 
 STUCK = np.array([-0.572, 0.893, -0.54])  # 45 mm from the wall, its sides at about 30 degrees
 GOAL = np.array([0.768, 0.306, 1.147])
@@ -35,7 +36,7 @@ def beside_walls(planner, count, seed):
     while found < count:
         pose = random.uniform([x0, y0, -np.pi], [x1, y1, np.pi])
         if scene.settings.safety_distance < scene.object_clearance(pose) < 0.06:
-            pushes = turning_pushes(scene, pose, None, 6)
+            pushes = finish(turning_search(scene, pose, None, 6))
             found += bool(pushes)
             yield pose, pushes
 
@@ -109,8 +110,8 @@ def test_the_robot_must_have_a_way_to_the_corner(scenario, robot, box):
     occupied[row - wide : row + wide + 1, column - wide : column + wide + 1] = False
     ringed = OccupancyGrid(occupied, grid.resolution, grid.origin)
     scene = PushPlanner(PlannerSettings(), ringed, robot, box).scene
-    assert turning_pushes(scene, STUCK, np.array([0.0, -0.5, 0.0]), 6)
-    assert not turning_pushes(scene, STUCK, np.array([*at, 0.0]), 6)
+    assert finish(turning_search(scene, STUCK, np.array([0.0, -0.5, 0.0]), 6))
+    assert not finish(turning_search(scene, STUCK, np.array([*at, 0.0]), 6))
 
 
 @pytest.mark.long
