@@ -20,7 +20,7 @@ COPIES = {
 PACKAGES = (
     *("push_job", "push_model", "push_scenario", "push_estimation", "push_qp", "push_planner"),
     *("push_mpc", "push_supervisor", "grasp_opt", "swarm_push", "sim_bridge", "lab_bridge"),
-    *("push_ros", "push_record", "push_view", "push_bringup", "push_study"),
+    *("push_ros", "push_record", "push_view", "push_gym", "push_bringup", "push_study"),
 )
 _HEAD = """# API
 
