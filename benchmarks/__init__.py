@@ -9,6 +9,7 @@ NAMES = (
     "curve",
     "grasp",
     "group",
+    "gym",
     "mpc",
     "nmpc",
     "placement",

@@ -18,23 +18,12 @@ from push_model.occupancy import MapSpec
 from push_model.settings import bounded, settings
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
 from sim_bridge.planar.constraints import HOLONOMIC
-from sim_bridge.planar.shapes import Part, body_parts, fixed_parts
 from sim_bridge.planar.solve import advance
-from sim_bridge.planar.tables import (
-    grown,
-    make_bodies,
-    make_contacts,
-    make_parts,
-    make_sums,
-    object_row,
-    robot_parts,
-    robot_row,
-)
+from sim_bridge.planar.tables import grown, make_contacts, make_sums, make_tables
 from sim_bridge.world import BodyPoses, Contact, WheelState
 from sim_bridge.worlds import Objects, Robots, WorldKind, steps_of
 
 _FEW = 12  # robots that are commanded one by one
-_CONTACTS = 8  # a part, for which there is room at first
 
 
 @settings
@@ -84,25 +73,12 @@ class PlanarWorld:
         self._starts = np.array(
             [start for _, start in [*robots.values(), *objects.values()]], dtype=np.float64
         ).reshape(-1, 3)
-        parts: list[tuple[int, Part]] = []
-        rows = []
-        for i, (name, (robot, _)) in enumerate(robots.items()):
-            parts += [(i, part) for part in robot_parts(robot)]
-            rows.append(robot_row(name, robot))
-        for i, (item, _) in enumerate(objects.values(), len(robots)):
-            outline = item.geometry.outline
-            parts += [(i, part) for part in body_parts(outline, item.contact_friction)]
-            rows.append(object_row(item))
-        fixed = fixed_parts(environment)
-        self._fixed_names = [name for name, _ in fixed]
-        self._bodies = make_bodies(rows)
-        self._centres = np.array([row[6] for row in rows], dtype=np.float64).reshape(-1, 2)
+        tables = make_tables(environment, robots, objects)
+        self._fixed_names = list(tables.fixed)
+        self._bodies, self._centres = tables.bodies, tables.centres
         self._off_centre = bool(self._centres.any())
-        self._parts, self._near = make_parts(parts, [part for _, part in fixed])
-        most = _CONTACTS * (len(parts) + 8)
-        self._largest = float(self._parts.radius[: len(parts)].max(initial=0.0))
-        self._contacts = make_contacts(most)
-        self._sums = make_sums(most)
+        self._parts, self._near, self._largest = tables.parts, tables.near, tables.largest
+        self._contacts, self._sums = make_contacts(tables.room), make_sums(tables.room)
         self._drives = [robot.drive for robot, _ in robots.values()]
         self._fastest = np.array([(d.max_speed, d.max_turn_rate) for d in self._drives])
         self._dead: set[str] = set()

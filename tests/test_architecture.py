@@ -23,7 +23,7 @@ FLOORS = [
         "lab_bridge",
         "push_record",
     },
-    {"push_bringup", "push_view"},
+    {"push_bringup", "push_view", "push_gym"},
     {"push_study"},
     {"benchmarks"},
     {"planar_push"},
@@ -34,7 +34,7 @@ ROS = {"rclpy", "push_ros", "push_msgs", "tf2_msgs", "ament_index_python"} | {
     f"{kind}_msgs"
     for kind in ("std", "geometry", "nav", "sensor", "visualization", "diagnostic", "rosgraph")
 }
-WITHOUT_ROS = {"push_model", "push_job", "push_scenario", "push_estimation", "push_qp"}
+WITHOUT_ROS = {"push_model", "push_job", "push_scenario", "push_estimation", "push_qp", "push_gym"}
 SHELLS = {"push_planner", "push_mpc", "push_supervisor", "grasp_opt", "swarm_push"}
 LONGEST = 400  # lines
 

@@ -1,8 +1,8 @@
 """Arrays of a planar world from what robots, objects and walls are."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -11,15 +11,17 @@ from push_model.arrays import Array
 from push_model.bumpers import RingBumper
 from push_model.drives import HolonomicDrive, SpeedDrive
 from push_model.limit_surface import GRAVITY
+from push_model.occupancy import MapSpec
 from push_model.settings import SettingsError
-from push_model.specs import ObjectSpec, RobotSpec
+from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
 from sim_bridge.planar.collide import Neighbours, Parts
 from sim_bridge.planar.constraints import HOLONOMIC, OBJECT, WHEELS, Bodies
 from sim_bridge.planar.memory import Contacts, Sums, rehash
-from sim_bridge.planar.shapes import Buckets, Part, PartTable, body_parts
+from sim_bridge.planar.shapes import Buckets, Part, PartTable, body_parts, fixed_parts
 
 _ROBOT_FRICTION = 1.0  # as PyBullet's robots: that of a contact is what they touch
 _LARGE = 2.5  # times the median radius: parts that all others are held against
+_CONTACTS = 8  # a part, for which there is room at first
 _LEVER = 2.0 / 3.0  # of its radius at which a disc's traction turns it
 
 Table = TypeVar("Table", Contacts, Sums)
@@ -170,3 +172,54 @@ def object_row(item: ObjectSpec) -> Row:
     surface = item.limit_surface()
     floor = (surface.max_force, surface.max_torque)
     return OBJECT, item.mass, item.moment, floor, (0.0, 0.0), (0.0, 0.0), item.com
+
+
+@dataclass(frozen=True)
+class Tables:
+    """A planar world at rest in the origin.
+
+    bodies: robots, then objects; centres ``(n, 2)`` [m]: of mass, in their frames. fixed: names of
+    walls and obstacles. largest: [m] radius of the largest moving part. room: rows of contacts that
+    are enough at first.
+    """
+
+    bodies: Bodies
+    parts: Parts
+    near: Neighbours
+    centres: Array
+    fixed: tuple[str, ...]
+    largest: float
+    room: int
+
+
+def make_tables(
+    environment: EnvironmentSpec | MapSpec,
+    robots: Mapping[str, tuple[RobotSpec, Array]],
+    objects: Mapping[str, tuple[ObjectSpec, Array]],
+) -> Tables:
+    """The tables of what robots, objects and walls are; robots and objects as ``PlanarWorld`` has
+    them.
+
+    Raises
+    ------
+    SettingsError: a robot is driven by torques, which needs wheels that can spin.
+    """
+    parts: list[tuple[int, Part]] = []
+    rows = []
+    for i, (name, (robot, _)) in enumerate(robots.items()):
+        parts += [(i, part) for part in robot_parts(robot)]
+        rows.append(robot_row(name, robot))
+    for i, (item, _) in enumerate(objects.values(), len(robots)):
+        parts += [(i, part) for part in body_parts(item.geometry.outline, item.contact_friction)]
+        rows.append(object_row(item))
+    fixed = fixed_parts(environment)
+    table, near = make_parts(parts, [part for _, part in fixed])
+    return Tables(
+        make_bodies(rows),
+        table,
+        near,
+        np.array([row[6] for row in rows], dtype=np.float64).reshape(-1, 2),
+        tuple(name for name, _ in fixed),
+        float(table.radius[: len(parts)].max(initial=0.0)),
+        _CONTACTS * (len(parts) + 8),
+    )

@@ -1,0 +1,55 @@
+"""Levels of actions: numbers between -1 and 1 become twists of the robots."""
+
+import numpy as np
+
+from push_gym.settings import EnvSettings
+from push_model.arrays import Array
+from push_model.settings import SettingsError
+from push_model.specs import RobotSpec
+
+PUSH_SIZE = 3
+"""Numbers of an action of the level "push"."""
+
+
+def action_size(settings: EnvSettings, robot: RobotSpec) -> int:
+    """Numbers of an action, for all robots together.
+
+    Raises
+    ------
+    SettingsError: "wheels", and the robots have none.
+    """
+    if settings.action == "push":
+        return PUSH_SIZE
+    return settings.robots * robot_action_size(settings.action, robot)
+
+
+def robot_action_size(level: str, robot: RobotSpec) -> int:
+    """Numbers of an action of one robot."""
+    wheels = robot.kinematics is not None
+    if level == "wheels" and not wheels:
+        raise SettingsError("action 'wheels': the robots have none; use 'twist'")
+    return 2 if wheels else 3
+
+
+def twists(level: str, robot: RobotSpec, actions: Array) -> Array:
+    """Twists ``(…, robots, 3)`` [m/s, m/s, rad/s], robot frame, of actions ``(…, robots, k)``.
+
+    Parameters
+    ----------
+    level: "wheels": left and right wheel, of their greatest speed. "twist": forward speed and turn
+        rate, of the robot's greatest; forward, left and turn rate of robots without wheels.
+    """
+    told = np.clip(np.asarray(actions, dtype=np.float64), -1.0, 1.0)
+    result = np.zeros((*told.shape[:-1], 3))
+    if level == "wheels":
+        drive = robot.differential
+        fastest = drive.max_wheel_speed
+        left, right = fastest * told[..., 0], fastest * told[..., 1]
+        result[..., 0] = (left + right) * drive.wheel_radius / 2.0
+        result[..., 2] = (right - left) * drive.wheel_radius / (2.0 * drive.half_track)
+        return result
+    result[..., 0] = robot.max_speed * told[..., 0]
+    if robot.kinematics is None:
+        result[..., 1] = robot.max_speed * told[..., 1]
+    result[..., 2] = robot.max_turn_rate * told[..., -1]
+    return result

@@ -1,0 +1,65 @@
+"""Random states of a room: where object, goal and robots are when an episode begins."""
+
+import math
+
+import numpy as np
+
+from push_model import se2
+from push_model.arrays import Array
+from push_model.distance_field import DistanceField
+from push_model.occupancy import rasterise
+from push_model.outlines import distance, inside
+from push_model.settings import SettingsError
+from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
+
+_TRIES = 64  # places that are drawn at once
+_GIVE_UP = 100  # such draws
+_GAP = 0.02  # [m] between bodies
+_ROBOTS_ROOM = 2.5  # radii of a robot that fit between an object and a wall
+
+
+class Draws:
+    """Of one room. Poses are of bodies' frames."""
+
+    def __init__(self, environment: EnvironmentSpec, robot: RobotSpec, item: ObjectSpec) -> None:
+        self._field = DistanceField(rasterise(environment))
+        self._half = 0.5 * np.array(environment.size)
+        self._radius, self._item = robot.footprint_radius, item
+        reach = float(np.hypot(*item.outline.T).max())
+        self._around = reach + _ROBOTS_ROOM * self._radius
+
+    def object(self, random: np.random.Generator) -> Array:
+        """A pose ``(3,)`` of the object with room for a robot all about it.
+
+        Raises
+        ------
+        SettingsError: there is no such place.
+        """
+        for _ in range(_GIVE_UP):
+            places = random.uniform(-self._half, self._half, (_TRIES, 2))
+            headings = random.uniform(-math.pi, math.pi, _TRIES)
+            for place, heading in zip(places, headings, strict=True):
+                if self._field.at(*place) > self._around:
+                    return np.array([*place, heading])
+        raise SettingsError("room: the object and a robot beside it fit nowhere; enlarge it")
+
+    def robots(self, random: np.random.Generator, count: int, pose: Array) -> Array:
+        """``(count, 3)`` poses, apart from each other, walls and the object at a pose.
+
+        Raises
+        ------
+        SettingsError: there are not so many places.
+        """
+        outline = se2.transform(pose, self._item.outline)
+        least, found = self._radius + _GAP, np.zeros((0, 3))
+        for _ in range(_GIVE_UP):
+            places = random.uniform(-self._half, self._half, (_TRIES, 2))
+            headings = random.uniform(-math.pi, math.pi, _TRIES)
+            free = ~inside(outline, places) & (distance(outline, places) > least)
+            for place, heading in zip(places[free], headings[free], strict=True):
+                apart = np.hypot(*(found[:, :2] - place).T).min(initial=math.inf)
+                if apart > 2.0 * self._radius + _GAP and self._field.at(*place) > least:
+                    found = np.vstack([found, [*place, heading]])
+                    if len(found) == count:
+                        return found
+        raise SettingsError(f"room: {count} robots do not fit; enlarge it or take fewer")

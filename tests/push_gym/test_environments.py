@@ -1,0 +1,237 @@
+"""The environments as Gymnasium and PettingZoo want them."""
+
+import math
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from pettingzoo.test import parallel_api_test, parallel_seed_test
+
+import push_gym
+from push_gym import PlanarPushEnv, parallel_env
+from push_model.settings import SettingsError
+
+LEVELS = [(s, a) for s in ("Single", "Group", "Swarm") for a in ("wheels", "twist")]
+
+
+def make(system, **values):
+    return gymnasium.make(f"PlanarPush/{system}-v0", **values)
+
+
+def vector(system, count, **values):
+    name = f"PlanarPush/{system}-v0"
+    mode = gymnasium.VectorizeMode.VECTOR_ENTRY_POINT
+    return gymnasium.make_vec(name, num_envs=count, vectorization_mode=mode, **values)
+
+
+@pytest.mark.parametrize(("system", "action"), LEVELS)
+def test_gymnasium_finds_nothing_to_say(system, action):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(make(system, action=action, render_mode="rgb_array").unwrapped)
+
+
+@pytest.mark.parametrize("system", ["group", "swarm", "single"])
+def test_pettingzoo_finds_nothing_to_say(system):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", "options: 'options' is not known")  # it hands that in
+        parallel_api_test(parallel_env(system, horizon=2.0), num_cycles=60)
+        parallel_seed_test(lambda: parallel_env(system, horizon=2.0), num_cycles=30)
+
+
+def test_observations_stay_in_their_space():
+    """200 random episodes of all systems, robots at full speed into each other and the walls."""
+    for system in ("Single", "Group", "Swarm"):
+        env = vector(system, 64, horizon=5.0)
+        env.reset(seed=3)
+        env.action_space.seed(4)
+        for _ in range(110):
+            action = np.sign(env.action_space.sample()).astype(np.float32)
+            seen, reward, *_ = env.step(action)
+            for key, space in env.single_observation_space.items():
+                assert (np.abs(seen[key]) <= space.high).all(), key
+            assert np.isfinite(reward).all() and (reward <= 0.0).all()
+
+
+@pytest.mark.parametrize(("system", "action"), LEVELS)
+def test_many_rooms_are_many_single_ones(system, action):
+    """Equal seeds, equal actions: equal episodes to the bit, resets included."""
+    count, steps = 5, 45
+    many = vector(system, count, action=action, horizon=2.0)
+    alone = [make(system, action=action, horizon=2.0) for _ in range(count)]
+    seen, _ = many.reset(seed=11)
+    for i, env in enumerate(alone):
+        one, _ = env.reset(seed=11 + i)
+        assert all(np.array_equal(one[k], seen[k][i]) for k in one)
+    many.action_space.seed(1)
+    ended = [False] * count
+    for _ in range(steps):
+        told = many.action_space.sample()
+        seen, reward, terminated, truncated, _ = many.step(told)
+        for i, env in enumerate(alone):
+            if ended[i]:
+                one, _ = env.reset()
+                answer = 0.0, False, False
+            else:
+                one, *rest, _ = env.step(told[i])
+                answer = tuple(rest)
+            assert all(np.array_equal(one[k], seen[k][i]) for k in one)
+            assert (reward[i], terminated[i], truncated[i]) == answer
+            ended[i] = bool(answer[1] or answer[2])
+    assert not any(t < 0 for t in many.unwrapped.arena.times)
+
+
+def test_a_reset_with_a_seed_is_the_same_whatever_was_before():
+    env = make("Group")
+    first, _ = env.reset(seed=5)
+    for _ in range(20):
+        env.step(env.action_space.sample())
+    second, _ = env.reset(seed=5)
+    assert all(np.array_equal(first[k], second[k]) for k in first)
+    third, _ = env.reset(seed=6)
+    assert not np.array_equal(first["observation"], third["observation"])
+
+
+@pytest.mark.parametrize("reward", ["sparse", "dense"])
+def test_rewards_can_be_computed_anew(reward):
+    """As hindsight relabelling needs: of one goal and of many, equal to those of the steps."""
+    env = make("Single", reward=reward).unwrapped
+    seen, _ = env.reset(seed=1)
+    achieved, rewards, desired = [], [], seen["desired_goal"]
+    for k in range(50):
+        seen, r, terminated, _, info = env.step(np.array([1.0, 0.3 * math.sin(k)]))
+        achieved.append(seen["achieved_goal"])
+        rewards.append(r)
+        assert r == env.compute_reward(seen["achieved_goal"], desired, info)
+        assert terminated == env.compute_terminated(seen["achieved_goal"], desired, info)
+    many = env.compute_reward(np.array(achieved), np.tile(desired, (50, 1)), {})
+    assert many.tolist() == rewards
+    own = env.compute_reward(np.array(achieved), np.array(achieved), {})
+    assert own == pytest.approx(0.0, abs=1e-6)
+    assert env.compute_terminated(np.array(achieved), np.array(achieved), {}).all()
+    assert not env.compute_truncated(np.array(achieved), np.array(achieved), {}).any()
+
+
+def test_an_episode_ends_at_the_goal_and_is_cut_off_by_time():
+    """Pushed straight on to a goal ahead: terminated. Standing: truncated when time is over."""
+    env = make("Single", horizon=6.0, room=(3.0, 1.6))
+    put = {"start": [0.0, 0.0, 0.0], "robots": [[-0.12, 0.0, 0.0]], "goal": [0.2, 0.0, 0.0]}
+    env.reset(seed=1, options=put)
+    for _ in range(60):
+        seen, _, terminated, truncated, info = env.step(np.array([0.8, 0.0], dtype=np.float32))
+        if terminated or truncated:
+            break
+    assert terminated and not truncated and info["is_success"]
+    assert abs(seen["achieved_goal"][0] - 0.2) < 0.02 and info["time"] < 6.0
+    env.reset(seed=1, options=put)
+    steps = 0
+    while True:
+        steps += 1
+        _, _, terminated, truncated, info = env.step(np.zeros(2, dtype=np.float32))
+        if terminated or truncated:
+            break
+    assert truncated and not terminated and steps == 60 and not info["is_success"]
+
+
+def test_wheels_and_twists_are_two_ways_to_say_the_same():
+    put = {"start": [0.3, 0.0, 0.0], "robots": [[-0.3, 0.0, 0.4]], "goal": [0.6, 0.0, 0.0]}
+    wheels, twist = (make("Single", action=a).unwrapped for a in ("wheels", "twist"))
+    drive = wheels.arena.robot.differential
+    for env in (wheels, twist):
+        env.reset(seed=1, options=put)
+    left, right = 0.5, 0.9
+    v, omega = drive.twist(left * drive.max_wheel_speed, right * drive.max_wheel_speed)
+    told = np.array([v / drive.max_speed, omega / drive.max_turn_rate])
+    for _ in range(10):
+        a, *_ = wheels.step(np.array([left, right]))
+        b, *_ = twist.step(told)
+    assert a["observation"] == pytest.approx(b["observation"], abs=1e-6)
+    gone = a["observation"][:2] - [-0.3, 0.0]
+    assert np.hypot(*gone) == pytest.approx(1.0 * v, rel=0.1)
+
+
+def test_physics_and_shapes_come_with_the_options():
+    """A heavier floor does not move what a light one does; another shape has another outline."""
+    env = make("Single", room=(3.0, 1.6)).unwrapped
+    put = {"start": [0.0, 0.0, 0.0], "robots": [[-0.12, 0.0, 0.0]], "goal": [1.0, 0.0, 0.0]}
+    ends = []
+    for change in ({"floor_friction": 0.2}, {"mass": 20.0, "floor_friction": 1.5}):
+        env.reset(seed=1, options=put | {"object": change})
+        for _ in range(30):
+            seen, *_ = env.step(np.array([0.8, 0.0]))
+        ends.append(float(seen["achieved_goal"][0]))
+    assert ends[0] > 0.15 and abs(ends[1]) < 0.02
+    shape = {"ellipse": {"semi_axis_x": 0.1, "semi_axis_y": 0.05}}
+    env.reset(seed=1, options={"object": {"shape": shape}})
+    assert env.arena.item.outline[:, 0].max() == pytest.approx(0.1, rel=1e-3)
+    env.reset(seed=1, options={"object": "plate_hexagon"})
+    assert len(env.arena.item.outline) == 6
+    env.reset(seed=2)
+    assert len(env.arena.item.outline) == 6, "an object stays until another one is asked for"
+
+
+@pytest.mark.parametrize(
+    ("values", "told"),
+    [
+        ({"robots": 0}, "robots"),
+        ({"robots": 2.5}, "robots"),
+        ({"object": "no_such"}, "no_such"),
+        ({"robot": "pioneer", "object": "pioneer_box", "room": (6.0, 6.0)}, "torque"),
+        ({"robot": "disc", "action": "wheels"}, "wheels"),
+        ({"action": "fly"}, "action"),
+        ({"period": math.nan}, "period"),
+        ({"speed": 1.0}, "unknown setting 'speed'"),
+        ({"room": (0.2, 0.2)}, "room"),
+        ({"room": "no_such"}, "no_such"),
+    ],
+)
+def test_wrong_settings_are_named(values, told):
+    with pytest.raises(SettingsError, match=told):
+        PlanarPushEnv("group", **values).reset(seed=1)
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ({"robot": [0, 0, 0]}, "unknown key 'robot'"),
+        ({"start": [0.0, 0.0]}, "start"),
+        ({"goal": [0.0, math.nan, 0.0]}, "goal"),
+        ({"robots": [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]}, "robots"),
+        ({"object": {"colour": "red"}}, "colour"),
+        ({"object": {"mass": -1.0}}, "mass"),
+    ],
+)
+def test_wrong_options_are_named(options, told):
+    with pytest.raises(SettingsError, match=told):
+        make("Single").reset(seed=1, options=options)
+
+
+def test_draws_leave_room_between_all_bodies():
+    """300 resets: nothing overlaps, the object has room for a robot on every side."""
+    env = vector("Swarm", 300)
+    env.reset(seed=9)
+    arena = env.unwrapped.arena
+    poses, radius = arena.world.poses, arena.robot.footprint_radius
+    before = poses.copy()
+    half = 0.5 * np.array(arena.environment.size)
+    reach = np.hypot(*arena.item.outline.T).max()
+    assert (np.abs(poses[:, -1, :2]) < half - reach - 2.0 * radius).all()
+    robots = poses[:, :-1, :2]
+    apart = np.hypot(*(robots[:, :, None] - robots[:, None]).transpose(3, 0, 1, 2))
+    apart += 10.0 * np.eye(robots.shape[1])
+    assert apart.min() > 2.0 * radius
+    env.step(np.zeros(env.action_space.shape, dtype=np.float32))
+    assert np.abs(arena.world.poses - before).max() < 1e-9, "bodies that overlap would be parted"
+    assert np.abs(arena.goals[:, 2]).max() > 3.0
+
+
+def test_all_names_are_registered():
+    assert set(push_gym.ENVIRONMENTS) <= set(gymnasium.registry)
+    push_gym.register_all()  # again: nothing happens
+    env = make("Single", render_mode="rgb_array")
+    env.reset(seed=1)
+    image = env.render()
+    assert image.shape == (384, 480, 3) and len(np.unique(image.reshape(-1, 3), axis=0)) > 4
