@@ -29,7 +29,8 @@ class StudyOptions:
     scheduler: address of a Dask scheduler; empty for local processes. workers: 0 for one a core.
     uncertainty: name of how far the world is from what is believed. world: kind of world; empty for
     the experiment's own. asked: names of the options that somebody has set. One that the
-    experiment does not use is refused, see ``Experiment.OPTIONS``.
+    experiment does not use is refused, see ``Experiment.OPTIONS``. methods: of the leaderboard, by
+    name or MODULE:ATTRIBUTE; all where none is named.
     """
 
     scenarios: tuple[str, ...]
@@ -41,6 +42,7 @@ class StudyOptions:
     uncertainty: str = "mild"
     world: str = ""
     asked: frozenset[str] = frozenset()
+    methods: tuple[str, ...] = ()
 
 
 class Experiment(Protocol):

@@ -62,8 +62,8 @@ class SupervisorSettings:
         low=0,
         high=100,
         doc="Maximum number of new plans in a row without progress. A push makes progress if "
-        "fewer pushes are left after it than before. The same number limits how often the "
-        "object may be displaced by others before a push is completed.",
+        "fewer pushes are left after it than after any earlier push. The same number limits how "
+        "often the object may be displaced by others before a push is completed.",
     )
     max_retries: int = bounded(
         2,

@@ -1,0 +1,112 @@
+"""One match: a method at a contest, with a seed, in the graph in lockstep."""
+
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from push_bringup.systems import OUTLINE_ESTIMATOR
+from push_job.method import Task
+from push_model.arrays import Array
+from push_scenario.bodies import load_robot
+from push_scenario.scenario import Scenario
+from push_study.experiments.swarm_outline import mistaken
+from push_study.leaderboard.contests import Contest, Problem, contest, straight
+from push_study.leaderboard.entries import POSITIONS, entries
+from push_study.leaderboard.entry import Entry
+from push_study.pool import Row
+from push_study.team_run import OBJECT, made_scenario, run_team
+from push_study.uncertainty import uncertainty
+
+_SLACK = 1.05  # of a tolerance, for methods only know noisy poses
+
+
+@dataclass(frozen=True)
+class Match:
+    """scenario: name of the contest. method: name of the entry, or MODULE:ATTRIBUTE."""
+
+    scenario: str
+    seed: int
+    out: str
+    method: str
+    world: str
+    uncertainty: str
+
+
+def play(match: Match) -> Row:
+    """Run it; the measures of a row."""
+    what, entry = contest(match.scenario), entry_of(match.method)
+    problem = what.draw(match.seed)
+    scenario = _scenario(match, what, entry, problem)
+    began = time.process_time()
+    outcome = run_team(
+        entry.system,
+        scenario,
+        Task((problem.goal,)),
+        uncertainty(match.uncertainty),
+        match.seed,
+        what.limit,
+        world=match.world,
+        mistake=_disc if entry.disc else None,
+    )
+    spent = time.process_time() - began
+    away, turned = outcome.error
+    near = away <= _SLACK * what.tolerance[0] and turned <= _SLACK * what.tolerance[1]
+    ways = np.array(outcome.trace.ways)[:, 0]
+    row: Row = {
+        "scenario": match.scenario,
+        "seed": match.seed,
+        "method": entry.name,
+        "entry": match.method,
+        "success": bool(outcome.success and near),
+        **outcome.row(),
+        "cpu_s": spent,
+    }
+    if row["success"]:
+        direct = straight(problem)
+        row["lambda"] = outcome.charged * problem.robot.max_speed / direct
+        row["path_ratio"] = _length(ways) / direct
+    elif outcome.success:
+        row["reason"] = f"said it was done {1e3 * away:.0f} mm, {turned:.2f} rad off"
+    return row
+
+
+def entry_of(name: str) -> Entry:
+    """By the name of a match."""
+    return entries((name,))[-1] if ":" in name else entries((name,))[0]
+
+
+def _scenario(match: Match, what: Contest, entry: Entry, problem: Problem) -> Scenario:
+    robot = load_robot(entry.robot) if entry.robot else problem.robot
+    parameters = {k: dict(v) for k, v in entry.parameters.items()}
+    own: dict[str, object] = {}
+    if what.kind == POSITIONS:
+        own = {"position_tolerance": what.tolerance[0], "orientation": False}
+        if entry.system == "swarm":
+            own["stalled"] = what.limit
+        elif entry.reconstructed:
+            own["seed"] = match.seed
+    if own:
+        parameters[entry.system] = {**own, **parameters.get(entry.system, {})}
+    return made_scenario(
+        match.scenario,
+        problem.environment,
+        robot,
+        problem.robots,
+        problem.item,
+        problem.start,
+        parameters,
+    )
+
+
+def _disc(scenario: Scenario) -> Scenario:
+    """The object is believed to be its circumscribed disc, and the estimator learns its outline."""
+    item, start = scenario.objects[OBJECT]
+    scenario = replace(scenario, objects={OBJECT: (mistaken(item, None), start)})
+    return scenario.settings(OUTLINE_ESTIMATOR, enabled=True)
+
+
+def _length(ways: Array) -> float:
+    """[m] of the path of an object, sampled so coarsely that noise of the physics is no way."""
+    steps = np.hypot(*np.diff(ways[::5, :2], axis=0).T)
+    return float(steps.sum())

@@ -1,0 +1,111 @@
+"""What the matches amount to: cells with intervals, and ranks among methods that are told the same.
+
+A cell is a method at a contest. Success has Wilson's 95 % interval, Lambda (time of the robots at
+full speed on the straight line, planning included) Student's over the matches that succeeded. One
+cell leads another when its interval of the share of successes lies above the other's, or where
+these overlap, when its interval of Lambda lies below.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import t as student
+
+from push_study.leaderboard.entry import Entry
+from push_study.pool import Row
+from push_study.statistics import wilson
+
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A method at a contest. lambda_, path, cpu: means over what succeeded (cpu: over all), nan
+    where nothing did. rank: 0 where it is not ranked. leads: names of methods that it leads."""
+
+    contest: str
+    entry: Entry
+    trials: int
+    successes: int
+    share: Interval
+    lambda_: float
+    lambda_interval: Interval
+    seconds: float
+    path: float
+    cpu: float
+    rank: int = 0
+    leads: tuple[str, ...] = ()
+
+
+def cells(rows: Sequence[Row], entries: Sequence[Entry], contests: Sequence[str]) -> list[Cell]:
+    """Of all rows, with ranks; contests in their order, methods by rank in what they are told."""
+    found = []
+    for name in contests:
+        here = [_cell(name, e, rows) for e in entries]
+        found += _ranked([c for c in here if c is not None])
+    return found
+
+
+def _cell(contest: str, entry: Entry, rows: Sequence[Row]) -> Cell | None:
+    mine = [r for r in rows if (r["scenario"], r.get("method")) == (contest, entry.name)]
+    if not mine:
+        return None
+    good = [r for r in mine if r["success"]]
+    values = np.array([r["lambda"] for r in good])
+    cpu = [r["cpu_s"] for r in mine if "cpu_s" in r]
+    return Cell(
+        contest,
+        entry,
+        len(mine),
+        len(good),
+        wilson(len(good), len(mine)),
+        _mean(values),
+        mean_interval(values),
+        _mean(np.array([r["charged_s"] for r in good])),
+        _mean(np.array([r["path_ratio"] for r in good])),
+        _mean(np.array(cpu)),
+    )
+
+
+def mean_interval(values: np.ndarray) -> Interval:
+    """95 % interval of a mean (Student's t); without bounds for fewer than two values."""
+    if len(values) < 2:
+        return -math.inf, math.inf
+    half = float(student.ppf(0.975, len(values) - 1) * values.std(ddof=1) / math.sqrt(len(values)))
+    return float(values.mean()) - half, float(values.mean()) + half
+
+
+def leads(first: Cell, second: Cell) -> bool:
+    """Whether one cell is better than another beyond what chance explains."""
+    if first.share[0] > second.share[1]:
+        return True
+    if second.share[0] > first.share[1]:
+        return False
+    return first.lambda_interval[1] < second.lambda_interval[0]
+
+
+def _ranked(here: list[Cell]) -> list[Cell]:
+    told = dict.fromkeys(c.entry.told for c in here)
+    result = []
+    for what in told:
+        equal = [c for c in here if c.entry.told == what]
+        # No Lambda is the worst Lambda.
+        ordered = sorted(equal, key=lambda c: (-c.successes / c.trials, _last(c.lambda_)))
+        number = 0
+        for c in ordered:
+            number += c.entry.ranked
+            if c.entry.ranked:
+                ahead = tuple(o.entry.name for o in ordered if o.entry.ranked and leads(c, o))
+                c = replace(c, rank=number, leads=ahead)
+            result.append(c)
+    return result
+
+
+def _last(value: float) -> float:
+    return math.inf if math.isnan(value) else value
+
+
+def _mean(values: np.ndarray) -> float:
+    return float(values.mean()) if len(values) else math.nan

@@ -1,0 +1,172 @@
+"""The leaderboard: equal problems, ranks only among equals, honest intervals."""
+
+import csv
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from planar_push.main import main
+from push_model.outlines import distance, inside
+from push_model.se2 import transform
+from push_model.settings import SettingsError
+from push_study.experiments import leaderboard
+from push_study.leaderboard.contests import CONTESTS
+from push_study.leaderboard.entries import ENTRIES, PLATES, POSES, POSITIONS, entries
+from push_study.leaderboard.entry import Entry, Reproduction, Told
+from push_study.leaderboard.match import Match, entry_of, play
+from push_study.leaderboard.standings import cells, leads, mean_interval
+from push_study.study import StudyOptions
+
+ALL, RADIUS = Told("exact", "all poses", "central"), Told("radius", "all poses", "central")
+KIND = frozenset({POSITIONS})
+
+OUTSIDER = Entry("outsider", "swarm", RADIUS, KIND, "a file of somebody else")
+"""As a user's file brings one."""
+
+
+def row(method, success, value, contest="open-square"):
+    found = {"scenario": contest, "method": method, "entry": method, "seed": 1, "success": success}
+    found |= {"cpu_s": 1.0}
+    return found | ({"lambda": value, "charged_s": value, "path_ratio": 1.0} if success else {})
+
+
+def test_every_kind_has_contests_and_at_least_two_methods():
+    for kind in (POSITIONS, POSES, PLATES):
+        assert sum(c.kind == kind for c in CONTESTS.values()) >= 2
+        assert sum(kind in e.kinds for e in ENTRIES) >= 2
+    assert {e.name for e in ENTRIES if not e.ranked} == {
+        e.name for e in ENTRIES if e.reconstructed and not (e.reproduction and e.reproduction.holds)
+    }
+
+
+@pytest.mark.parametrize("name", CONTESTS)
+def test_problems_depend_on_the_seed_alone_and_nothing_overlaps(name):
+    contest, seen = CONTESTS[name], set()
+    for seed in range(1, 13):
+        one, two = contest.draw(seed), contest.draw(seed)
+        assert all(
+            np.array_equal(getattr(one, f), getattr(two, f), equal_nan=True)
+            for f in ("start", "goal", "robots")
+        )
+        seen.add((*one.start, *one.goal, *one.robots.ravel()))
+        outline = transform(one.start, one.item.outline)
+        radius, places = one.robot.footprint_radius, one.robots[:, :2]
+        assert not inside(outline, places).any()
+        # A single robot stands as the thesis puts it: its bumper is what reaches farthest.
+        least = radius if contest.kind != POSES else one.robot.body_radius
+        assert (distance(outline, places) > least).all()
+        apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
+        assert (apart + 10.0 * np.eye(len(places)) > 2.0 * radius).all()
+    assert len(seen) >= (3 if contest.kind == POSES else 12)
+
+
+def test_contests_of_positions_have_the_room_that_methods_need():
+    for contest in CONTESTS.values():
+        if contest.kind == POSITIONS:
+            assert min(contest.draw(1).environment.size) >= 5.0
+
+
+def test_ranks_are_among_methods_that_are_told_the_same():
+    a, b, c = (Entry(n, "x", t, KIND) for n, t in (("a", ALL), ("b", ALL), ("c", RADIUS)))
+    rebuilt = Entry("d", "x", ALL, KIND, reconstructed=True)
+    rows = [row("a", True, 2.0 + 0.01 * k) for k in range(20)]
+    rows += [row("b", True, 3.0 + 0.01 * k) for k in range(20)]
+    rows += [row("c", k < 1, 9.0) for k in range(20)]
+    rows += [row("d", True, 1.0) for _ in range(20)]
+    found = {x.entry.name: x for x in cells(rows, (a, b, c, rebuilt), ["open-square"])}
+    assert {n: x.rank for n, x in found.items()} == {"a": 1, "b": 2, "c": 1, "d": 0}
+    assert found["a"].leads == ("b",) and not found["b"].leads and not found["c"].leads
+    assert found["d"].leads == (), "what does not reproduce its paper leads nobody"
+    holds = Reproduction("43 of 45", "44 of 45", True, "a test")
+    ranked = replace(rebuilt, reproduction=holds)
+    found = {x.entry.name: x for x in cells(rows, (a, b, c, ranked), ["open-square"])}
+    assert found["d"].rank == 1 and found["a"].rank == 2
+    assert "no reproduction" in rebuilt.why_not and ranked.why_not == ""
+    missed = replace(rebuilt, reproduction=replace(holds, ours="7 of 45", holds=False))
+    assert not missed.ranked and "43 of 45" in missed.why_not and "7 of 45" in missed.why_not
+
+
+def test_a_lead_is_seldom_chance():
+    """300 pairs of equal methods: hardly any leads the other; clearly better ones do."""
+    random = np.random.default_rng(1)
+
+    def cell(name, p, mean):
+        entry = Entry(name, "x", ALL, KIND)
+        made = [row(name, random.random() < p, random.normal(mean, 0.5)) for _ in range(20)]
+        return cells(made, (entry,), ["open-square"])[0]
+
+    chance = sum(leads(cell("a", 0.9, 3.0), cell("b", 0.9, 3.0)) for _ in range(300))
+    assert chance < 0.03 * 300
+    better = sum(leads(cell("a", 1.0, 3.0), cell("b", 0.3, 3.0)) for _ in range(100))
+    faster = sum(leads(cell("a", 1.0, 2.0), cell("b", 1.0, 3.5)) for _ in range(100))
+    assert better > 95 and faster > 95
+
+
+def test_intervals_cover_what_they_say():
+    random = np.random.default_rng(2)
+    hits = 0
+    for _ in range(400):
+        low, high = mean_interval(random.normal(5.0, 2.0, 12))
+        hits += low < 5.0 < high
+    assert 0.92 * 400 <= hits <= 0.98 * 400
+    assert binom.cdf(hits, 400, 0.95) > 1e-3
+    assert mean_interval(np.array([1.0])) == (-math.inf, math.inf)
+
+
+def test_names_of_methods():
+    assert entries() == ENTRIES
+    assert [e.name for e in entries(("crescent", "group"))] == ["crescent", "group"]
+    outside = entries(("tests.push_study.test_leaderboard:OUTSIDER",))
+    assert outside[-1] == OUTSIDER and len(outside) == len(ENTRIES) + 1
+    with pytest.raises(SettingsError, match="no method called 'cresent'"):
+        entries(("cresent",))
+    with pytest.raises(SettingsError, match="not an Entry"):
+        entry_of("tests.push_study.test_leaderboard:ALL")
+    with pytest.raises(SettingsError, match="no contest"):
+        leaderboard.tasks(StudyOptions(("nowhere",), 1, 1, "", methods=("crescent",)))
+    with pytest.raises(SettingsError, match="none of these methods"):
+        leaderboard.tasks(StudyOptions(("env1",), 1, 1, "", methods=("crescent",)))
+
+
+def test_the_parameters_of_an_entry_reach_its_method(monkeypatch):
+    """The printed planner is not ours: it makes other plans."""
+    seen = {}
+    module = "push_study.leaderboard.match"
+
+    def spy(system, scenario, *_, **__):
+        seen[len(seen)] = dict(scenario.parameters.get(system, {}))
+        raise InterruptedError
+
+    monkeypatch.setattr(f"{module}.run_team", spy)
+    for entry in ENTRIES:
+        name = next(c.name for c in CONTESTS.values() if c.kind in entry.kinds)
+        with pytest.raises(InterruptedError):
+            play(Match(name, 1, "", entry.name, "planar", "mild"))
+        told = seen[len(seen) - 1]
+        for key, value in entry.parameters.get(entry.system, {}).items():
+            flat = told[key]
+            assert value.items() <= flat.items(), entry.name
+
+
+@pytest.mark.long
+def test_one_command_makes_the_page_with_a_method_from_outside(tmp_path, monkeypatch, capsys):
+    """A short slice: two methods of the suite and one of somebody else; equal seeds, equal rows."""
+    rows = []
+    for out in (tmp_path / "a", tmp_path / "b"):
+        words = ["leaderboard", "--contests", "open-square", "--trials", "1", "--seed", "5"]
+        words += ["--methods", "crescent,tests.push_study.test_leaderboard:OUTSIDER"]
+        assert main([*words, "--out", str(out), "--workers", "2"]) == 0
+        with (out / "leaderboard.csv").open() as file:
+            table = list(csv.DictReader(file))
+        rows.append([{k: v for k, v in r.items() if k != "cpu_s"} for r in table])
+    strip = [{k: v for k, v in r.items() if not k.startswith("lambda")} for r in rows[0]]
+    assert rows[0][0]["method"] == "crescent" and rows[0][0]["successes"] == "1"
+    assert {r["method"] for r in rows[0]} == {"crescent", "outsider"}
+    again = [{k: v for k, v in r.items() if not k.startswith("lambda")} for r in rows[1]]
+    assert strip == again
+    page = (tmp_path / "a" / "leaderboard.html").read_text()
+    assert "outsider" in page and "Leaderboard" in page and "http" not in page.split("<body")[1]
+    assert "open-square" in capsys.readouterr().out
