@@ -64,6 +64,8 @@ class Experiment(Protocol):
         """Run one trial; importable, for it runs in other processes."""
         ...
 
+    # A module may also have ``ready()``, which raises SettingsError where something that it needs
+    # is not installed; nothing has been started then.
     # A module may also have ``statistics(rows) -> Mapping[str, Any]``: what the rows amount to
     # beyond means, by name, for ``aggregate`` in the summary.
 
@@ -99,6 +101,8 @@ def run_study(name: str, options: StudyOptions) -> dict[str, Any]:
     _check(options)
     _refuse_unused(name, what, options)
     options = replace(options, world=options.world or what.OPTIONS.get("world", ""))
+    if hasattr(what, "ready"):
+        what.ready()
     tasks = what.tasks(options)
     mark = {"experiment": name, "seed": options.seed}
     mark |= {option: getattr(options, option) for option in what.OPTIONS}

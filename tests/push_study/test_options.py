@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import math
+import sys
 
 import numpy as np
 import pytest
@@ -221,3 +222,10 @@ def test_a_goal_that_is_reached_with_a_collision_is_no_success(
     row = group_goals.trial(group_goals.GoalTask("open", 23, str(tmp_path), 3, 0, "planar", "none"))
     assert row["success"] is success and row["collision_ticks"] == ticks
     assert row["reason"] == ("" if success else f"collisions in {ticks} ticks")
+
+
+def test_what_is_not_installed_is_said_before_anything_is_started(tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "gym_pusht", None)
+    out = tmp_path / "out"
+    assert main(["experiment", "pusht", "--trials", "1", "--out", str(out)]) == 2
+    assert "gym-pusht is needed" in capsys.readouterr().err and not out.exists()
