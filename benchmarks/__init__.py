@@ -17,6 +17,7 @@ NAMES = (
     "latency",
     "lockstep",
     "physics",
+    "solvers",
     "stable-push",
     "swarm",
     "swarm-graph",

@@ -120,14 +120,15 @@ class Reference10:
         pass
 
 
-def cases(kind: Kind) -> list[Any]:
-    """Consecutive ticks of closed loops at 100 Hz: error, reference, obstacles.
+def cases(kind: Kind, seed: int = 0) -> list[Any]:
+    """Consecutive ticks of closed loops at 100 Hz: error, reference, obstacles. seed: other loops.
 
     Easy: near the reference, obstacles far away. Hard: far from the reference, on a bend near the
     curvature limit, obstacles close on both sides. There are always 20 obstacles.
     """
     hard = kind.hard
-    random = np.random.default_rng(7 if hard else 3)
+    first = 7 if hard else 3
+    random = np.random.default_rng([first, seed] if seed else first)
     p, h = 20, 0.1
     result = []
     for _ in range(LOOPS):
