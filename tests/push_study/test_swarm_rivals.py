@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from push_model import se2
+from push_model.outlines import distance, inside
 from push_scenario.bodies import load_object
 from push_study.experiments import swarm_rivals
-from push_study.rivals.gibbs import Gibbs
+from push_study.rivals.gibbs import Gibbs, _reach
 from push_study.rivals.global_input import GlobalInput
 from push_study.rivals.occlusion import Occlusion
 from push_study.rivals.rival import RivalArena
@@ -67,6 +68,27 @@ def test_the_random_field_draws_robots_to_the_object_where_it_hides_the_target()
         gone.append(rival.velocities(0.0, HERE, robots)[0])
     assert np.mean(np.array(gone) @ toward) > 0.02
     assert np.hypot(*np.array(gone).T).max() <= 0.128 + 1e-9
+
+
+def test_rays_of_the_random_field_end_at_the_outline():
+    """300 rays about random places: none passes through the outline, and none stops before it."""
+    random = np.random.default_rng(4)
+    corners = se2.transform(np.array([0.2, -0.1, 0.6]), SQUARE.geometry.outline)
+    met = 0
+    while met < 300:
+        start = random.uniform(-1.0, 1.0, 2)
+        if inside(corners, start[None])[0]:
+            continue
+        way = random.normal(size=2)
+        reach = float(_reach(start, way[None], corners)[0])
+        line = start + np.linspace(0.0, min(reach, 1.0), 200, endpoint=False)[:, None] * way
+        assert not inside(corners, line).any()
+        if math.isfinite(reach):
+            met += 1
+            beyond = start + (reach + 1e-6) * way
+            assert inside(corners, beyond[None])[0] or distance(corners, beyond[None])[0] < 1e-5
+        else:
+            assert not inside(corners, start + np.linspace(0, 1, 200)[:, None] * way).any()
 
 
 @pytest.mark.long
