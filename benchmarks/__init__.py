@@ -21,6 +21,7 @@ NAMES = (
     "stable-push",
     "swarm",
     "swarm-graph",
+    "third-opinion",
     "worlds",
 )
 """Modules of this package with a ``run``; a dash for each underscore."""
