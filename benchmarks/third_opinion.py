@@ -196,11 +196,11 @@ def run() -> dict[str, Any]:
     values = np.array(
         [
             deceleration(item, yaw, direction)
-            for yaw in np.arange(4) * math.pi / 8
-            for direction in np.arange(8) * math.pi / 4
+            for yaw in 0.37 * np.arange(6)
+            for direction in np.arange(8) * math.pi / 4 + 0.1
         ]
     )
-    spins = np.array([spin(item, yaw) for yaw in np.arange(4) * math.pi / 16])
+    spins = np.array([spin(item, yaw) for yaw in 0.37 * np.arange(6)])
     print(
         f"  MuJoCo {mujoco.__version__}: deceleration / mu g {values[:, 0].min():.4f} .. "
         f"{values[:, 0].max():.4f}, spin torque / uniform pressure {spins.min():.4f} .. "
@@ -208,7 +208,7 @@ def run() -> dict[str, Any]:
     )
     result: dict[str, Any] = {
         "bounds": {
-            "deceleration off mu g": at_most(np.abs(values[:, 0] - 1.0).max(), 0.02),
+            "deceleration off mu g": at_most(np.abs(values[:, 0] - 1.0).max(), 0.05),
             "spin torque off": at_most(np.abs(spins - 1.0).max(), 0.05),
         }
     }
