@@ -44,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     sys.path.insert(0, str(Path.cwd()))  # entries of a user's own files
     contests = arguments.contests or (QUICK if arguments.quick else "")
-    chosen = tuple(c for c in contests.split(",") if c)
+    chosen = _names(contests)
     out = arguments.out or f"results/leaderboard-{time.strftime('%Y%m%d-%H%M%S')}"
     options = StudyOptions(
         chosen or experiment("leaderboard").SCENARIOS,
@@ -56,6 +56,10 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.uncertainty,
         arguments.world,
         frozenset(),
-        tuple(m for m in arguments.methods.split(",") if m),
+        _names(arguments.methods),
     )
     return 0 if complete(run_study("leaderboard", options)) else 1
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(name.strip() for name in text.split(",") if name.strip())

@@ -1,5 +1,7 @@
 """Levels of actions: numbers between -1 and 1 become twists of the robots."""
 
+import math
+
 import numpy as np
 
 from push_gym.settings import EnvSettings
@@ -29,6 +31,21 @@ def robot_action_size(level: str, robot: RobotSpec) -> int:
     if level == "wheels" and not wheels:
         raise SettingsError("action 'wheels': the robots have none; use 'twist'")
     return 2 if wheels else 3
+
+
+def checked(actions: object, shape: tuple[int, ...], what: str) -> Array:
+    """Actions as numbers of a shape ``(…, k)``; an equal number of them in another shape will do.
+
+    Raises
+    ------
+    ValueError: another number of them, or one that is not finite.
+    """
+    told = np.asarray(actions, dtype=np.float64)
+    if told.size != math.prod(shape):
+        raise ValueError(f"action: expected {math.prod(shape)} numbers ({what}), got {told.size}")
+    if not np.isfinite(told).all():
+        raise ValueError(f"action: expected finite numbers, got {told.tolist()}")
+    return told.reshape(shape)
 
 
 def twists(level: str, robot: RobotSpec, actions: Array) -> Array:

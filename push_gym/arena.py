@@ -5,6 +5,7 @@ drawn in one does not depend on the others.
 """
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from push_gym.draws import Draws
 from push_gym.settings import EnvSettings, changed_object
 from push_model.arrays import Array, Mask, Rows
+from push_model.drives import TorqueDrive
 from push_model.settings import SettingsError
 from sim_bridge.planar_batch import PlanarBatch
 from sim_bridge.planar_world import PlanarSettings
@@ -35,6 +37,11 @@ class PushArena:
         """Raises SettingsError."""
         self.count, self.settings = count, settings
         self.robot, self.environment = settings.robot_spec, settings.environment
+        if isinstance(self.robot.drive, TorqueDrive):
+            raise SettingsError(
+                "robot: its wheels are driven by torque, which these environments do not simulate; "
+                "use epuck, epuck_ring, disc, or another robot with a drive of these kinds"
+            )
         self.goals = np.zeros((count, 3))
         self.times = np.zeros(count)
         self.headings = settings.orientation_tolerance is not None
@@ -73,13 +80,15 @@ class PushArena:
         ------
         SettingsError: an unknown option, poses of a wrong shape, bodies that do not fit.
         """
+        if options is not None and not isinstance(options, Mapping):
+            raise SettingsError(f"options: expected a mapping, got {options!r}")
         told = dict(options or {})
         for name in told:
             if name not in OPTIONS:
                 known = ", ".join(OPTIONS)
                 raise SettingsError(f"options: unknown key '{name}'; known: {known}")
         if "object" in told:
-            item = changed_object(self.settings.object_spec, told["object"])
+            item = changed_object(self.item, told["object"])
             if item != self.item:
                 if len(rooms) < self.count:
                     raise SettingsError("options: another object needs a reset of all rooms")
@@ -94,6 +103,10 @@ class PushArena:
             goal = _poses(told, "goal", (3,))
             self.goals[rooms[k]] = self._draws.object(random) if goal is None else goal
             poses[k, n] = start
+            if told:
+                self._draws.check(start, "start")
+                self._draws.check(self.goals[rooms[k]], "goal")
+                self._draws.check_robots(poses[k, :n], start)
         self.world.place(rooms, poses)
         self.times[rooms] = 0.0
 
@@ -158,7 +171,10 @@ def _errors(achieved: Array, desired: Array) -> tuple[Array, Array]:
 def _poses(told: dict[str, Any], name: str, shape: tuple[int, ...]) -> Array | None:
     if name not in told:
         return None
-    poses = np.asarray(told[name], dtype=np.float64)
+    try:
+        poses = np.asarray(told[name], dtype=np.float64)
+    except (TypeError, ValueError):
+        poses = np.full(0, np.nan)
     if poses.shape != shape or not np.isfinite(poses).all():
         raise SettingsError(f"options: {name}: expected finite numbers of shape {shape}")
     return poses

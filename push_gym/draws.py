@@ -8,7 +8,7 @@ from push_model import se2
 from push_model.arrays import Array
 from push_model.distance_field import DistanceField
 from push_model.occupancy import rasterise
-from push_model.outlines import distance, inside
+from push_model.outlines import distance, inside, overlap
 from push_model.settings import SettingsError
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
 
@@ -24,7 +24,7 @@ class Draws:
     def __init__(self, environment: EnvironmentSpec, robot: RobotSpec, item: ObjectSpec) -> None:
         self._field = DistanceField(rasterise(environment))
         self._half = 0.5 * np.array(environment.size)
-        self._radius, self._item = robot.footprint_radius, item
+        self._radius, self._item, self._robot = robot.footprint_radius, item, robot
         reach = float(np.hypot(*item.outline.T).max())
         self._around = reach + _ROBOTS_ROOM * self._radius
 
@@ -42,6 +42,23 @@ class Draws:
                 if self._field.at(*place) > self._around:
                     return np.array([*place, heading])
         raise SettingsError("room: the object and a robot beside it fit nowhere; enlarge it")
+
+    def check(self, pose: Array, name: str) -> None:
+        """Raise SettingsError if the object touches a wall at a pose ``(3,)``."""
+        if self._field.clearance(self._item.outline, pose) <= 0.0:
+            raise SettingsError(f"options: {name}: the object would touch a wall at {_told(pose)}")
+
+    def check_robots(self, robots: Array, pose: Array) -> None:
+        """Raise SettingsError if robots ``(n, 3)`` touch walls, each other or the object."""
+        item = se2.transform(pose, self._item.outline)
+        bodies = [se2.transform(r, self._robot.outline) for r in robots]
+        for i, (robot, body) in enumerate(zip(robots, bodies, strict=True)):
+            if self._field.clearance(self._robot.outline, robot) <= 0.0:
+                raise SettingsError(f"options: robots: robot {i} would touch a wall")
+            if overlap(body, item):
+                raise SettingsError(f"options: robots: robot {i} would be in the object")
+            if any(overlap(body, other) for other in bodies[:i]):
+                raise SettingsError(f"options: robots: robot {i} would be in another one")
 
     def robots(self, random: np.random.Generator, count: int, pose: Array) -> Array:
         """``(count, 3)`` poses, apart from each other, walls and the object at a pose.
@@ -63,3 +80,7 @@ class Draws:
                     if len(found) == count:
                         return found
         raise SettingsError(f"room: {count} robots do not fit; enlarge it or take fewer")
+
+
+def _told(pose: Array) -> str:
+    return f"({pose[0]:g}, {pose[1]:g}, {pose[2]:g})"

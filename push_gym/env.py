@@ -6,7 +6,7 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from push_gym.actions import action_size, twists
+from push_gym.actions import PUSH_SIZE, action_size, checked, twists
 from push_gym.arena import PushArena
 from push_gym.picture import picture
 from push_gym.pushes import Pushes
@@ -68,6 +68,9 @@ class PlanarPushEnv(gymnasium.Env[Observation, Any]):
         self.observation_space = observation_space(self.arena)
         size = action_size(self.settings, self.arena.robot)
         self.action_space = spaces.Box(-1.0, 1.0, (size,), dtype=np.float32)
+        count = self.settings.robots
+        self._shape = count, size // count
+        self._what = f"{count} robots with {size // count} each"
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -84,10 +87,11 @@ class PlanarPushEnv(gymnasium.Env[Observation, Any]):
         """One period, or one whole push."""
         info: dict[str, Any] = {}
         if self._pushes is not None:
-            reached, reason, _ = self._pushes.push(action)
+            told = checked(action, (PUSH_SIZE,), "of a push")
+            reached, reason, _ = self._pushes.push(told)
             info = {"push_reached": reached, "push_reason": reason}
         else:
-            told = np.asarray(action, dtype=np.float64).reshape(1, self.settings.robots, -1)
+            told = checked(action, (1, *self._shape), self._what)
             self.arena.step(twists(self.settings.action, self.arena.robot, told))
         seen = self._seen()
         terminated = self._at_goal(seen)

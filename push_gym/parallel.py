@@ -1,6 +1,5 @@
 """PettingZoo's parallel environments: every robot is an agent, and all share one reward."""
 
-import warnings
 from typing import Any, ClassVar
 
 import numpy as np
@@ -8,8 +7,8 @@ from gymnasium import spaces
 from gymnasium.utils import seeding
 from pettingzoo import ParallelEnv
 
-from push_gym.actions import robot_action_size, twists
-from push_gym.arena import OPTIONS, PER_BODY, PushArena
+from push_gym.actions import checked, robot_action_size, twists
+from push_gym.arena import PER_BODY, PushArena
 from push_gym.env import observed
 from push_gym.picture import picture
 from push_gym.settings import env_settings
@@ -46,6 +45,7 @@ class PlanarPushParallelEnv(ParallelEnv[str, Any, Any]):
         most = np.concatenate([state[: 2 * PER_BODY], goal, state[2 * PER_BODY :]])
         box = spaces.Box(-most, most)
         self.observation_spaces = dict.fromkeys(self.possible_agents, box)
+        self._size = size
         action = spaces.Box(-1.0, 1.0, (size,), dtype=np.float32)
         self.action_spaces = dict.fromkeys(self.possible_agents, action)
         self._random = seeding.np_random(None)[0]
@@ -66,16 +66,20 @@ class PlanarPushParallelEnv(ParallelEnv[str, Any, Any]):
             self._random = seeding.np_random(seed)[0]
         self.agents = list(self.possible_agents)
         told = dict(options or {})
-        for name in set(told) - set(OPTIONS):  # PettingZoo's own test hands in one: no error
-            del told[name]
-            warnings.warn(f"options: '{name}' is not known and does nothing", stacklevel=2)
+        told.pop("options", None)  # PettingZoo's own test hands that in
         self.arena.reset(_ROOM, [self._random], told)
         return self._seen(), {agent: {} for agent in self.agents}
 
     def step(self, actions: dict[str, Any]) -> tuple[dict[str, Any], ...]:
         """One period. A robot without an action stands."""
-        sizes = {agent: self.action_spaces[agent].shape[0] for agent in self.possible_agents}
-        told = [actions.get(a, np.zeros(sizes[a])) for a in self.possible_agents]
+        unknown = set(actions) - set(self.possible_agents)
+        if unknown:
+            known = ", ".join(self.possible_agents)
+            raise ValueError(f"no agent called '{min(unknown)}'; known: {known}")
+        told = [
+            checked(actions.get(a, np.zeros(self._size)), (self._size,), f"of {a}")
+            for a in self.possible_agents
+        ]
         self.arena.step(twists(self.settings.action, self.arena.robot, np.array(told)[None]))
         seen = observed(self.arena)
         goals = seen["achieved_goal"][0], seen["desired_goal"][0]

@@ -1,5 +1,6 @@
 """Many rooms as one Gymnasium vector environment: one compiled call moves all of them."""
 
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -8,7 +9,7 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from push_gym.actions import action_size, twists
+from push_gym.actions import action_size, checked, twists
 from push_gym.arena import PushArena
 from push_gym.env import Observation, observation_space, observed
 from push_gym.settings import env_settings
@@ -29,7 +30,11 @@ class PlanarPushVectorEnv(VectorEnv[Observation, Any, Any]):
     }
 
     def __init__(
-        self, num_envs: int = 1, system: str = "single", render_mode: None = None, **values: Any
+        self,
+        num_envs: int = 1,
+        system: str = "single",
+        render_mode: str | None = None,
+        **values: Any,
     ) -> None:
         """Parameters as of ``PlanarPushEnv``.
 
@@ -40,6 +45,12 @@ class PlanarPushVectorEnv(VectorEnv[Observation, Any, Any]):
         self.settings = env_settings(system, values)
         if self.settings.action == "push":
             raise SettingsError("action 'push': for one room only; use PlanarPushEnv")
+        if isinstance(num_envs, bool) or not isinstance(num_envs, int) or num_envs < 1:
+            raise SettingsError(
+                f"num_envs: expected a whole number of at least 1, got {num_envs!r}"
+            )
+        if render_mode is not None:
+            raise SettingsError("render_mode: many rooms cannot be rendered; leave it out")
         self.num_envs, self.render_mode = num_envs, render_mode
         self.arena = PushArena(num_envs, self.settings)
         self.single_observation_space = observation_space(self.arena)
@@ -47,6 +58,9 @@ class PlanarPushVectorEnv(VectorEnv[Observation, Any, Any]):
         self.single_action_space = spaces.Box(-1.0, 1.0, (size,), dtype=np.float32)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
+        count = self.settings.robots
+        self._shape = num_envs, count, size // count
+        self._what = f"{num_envs} rooms, {count} robots in each, {size // count} a robot"
         self._randoms = [seeding.np_random(None)[0] for _ in range(num_envs)]
         self._ended = np.zeros(num_envs, dtype=np.bool_)
 
@@ -56,7 +70,12 @@ class PlanarPushVectorEnv(VectorEnv[Observation, Any, Any]):
         """Begin an episode in every room. seed: of the first room, the next has the next; or a
         list, a room each."""
         if seed is not None:
-            seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int) else seed
+            first = None if isinstance(seed, Sequence) else int(seed)
+            seeds = list(seed) if isinstance(seed, Sequence) else []
+            if first is not None:
+                seeds = [first + i for i in range(self.num_envs)]
+            if len(seeds) != self.num_envs:
+                raise ValueError(f"seed: expected one for each of {self.num_envs} rooms")
             for i, one in enumerate(seeds):
                 if one is not None:
                     self._randoms[i] = seeding.np_random(one)[0]
@@ -69,8 +88,7 @@ class PlanarPushVectorEnv(VectorEnv[Observation, Any, Any]):
     def step(self, actions: Any) -> tuple[Observation, Any, Any, Any, dict[str, Any]]:
         """One period in every room."""
         still = self._ended
-        told = np.asarray(actions, dtype=np.float64)
-        told = told.reshape(self.num_envs, self.settings.robots, -1)
+        told = checked(actions, self._shape, self._what)
         if still.any():
             rooms = np.flatnonzero(still)
             self.arena.reset(rooms, [self._randoms[i] for i in rooms])

@@ -6,11 +6,11 @@ from typing import Any
 from push_model.settings import SettingsError
 from push_record.revision import revision
 from push_study.leaderboard.contests import CONTESTS, contest
-from push_study.leaderboard.entries import ENTRIES
-from push_study.leaderboard.match import Match, entry_of, play
+from push_study.leaderboard.entries import entries, entry_of
+from push_study.leaderboard.match import Match, play
 from push_study.leaderboard.page import write
 from push_study.leaderboard.standings import Cell, cells
-from push_study.pool import Row
+from push_study.pool import Row, crashed
 from push_study.study import StudyOptions
 
 SCENARIOS = tuple(CONTESTS)
@@ -23,10 +23,17 @@ def tasks(options: StudyOptions) -> list[Match]:
 
     Raises
     ------
-    SettingsError: a contest or a method that is not known; nobody to take part.
+    SettingsError: a contest or a method that is not known, or that has nothing to do with the
+        others.
     """
-    names = options.methods or tuple(e.name for e in ENTRIES)
-    who = {name: entry_of(name) for name in names}
+    who = entries(options.methods)
+    kinds = {contest(name).kind for name in options.scenarios}
+    for entry in who.values() if options.methods else ():
+        if not entry.kinds & kinds:
+            raise SettingsError(
+                f"'{entry.name}' takes part in contests of {', '.join(sorted(entry.kinds))}; those "
+                f"that were asked for are of {', '.join(sorted(kinds))}"
+            )
     world = options.world or OPTIONS["world"]
     found = [
         Match(name, options.seed + k, str(options.out), method, world, options.uncertainty)
@@ -35,14 +42,16 @@ def tasks(options: StudyOptions) -> list[Match]:
         for method, entry in who.items()
         if contest(name).kind in entry.kinds
     ]
-    if not found:
-        raise SettingsError("none of these methods takes part in any of these contests")
     return found
 
 
 def trial(task: Match) -> Row:
-    """One match."""
-    return play(task)
+    """One match; what goes wrong in it is the method's, and counts."""
+    try:
+        return play(task)
+    except Exception as error:
+        row = crashed(task, f"{type(error).__name__}: {error}")
+        return row | {"method": entry_of(task.method).name, "entry": task.method}
 
 
 def statistics(rows: list[Row]) -> dict[str, Any]:

@@ -1,9 +1,18 @@
 """The rows that the suite brings: its own methods, the thesis's, and those of other people."""
 
+from push_bringup.systems import system_of
 from push_model.settings import SettingsError
-from push_study.leaderboard.entry import Entry, Told, entry_from_outside
+from push_study.leaderboard.entry import (
+    PLATES,
+    POSES,
+    POSITIONS,
+    Entry,
+    Told,
+    entry_from_outside,
+)
 
-POSITIONS, POSES, PLATES = "positions", "poses of one robot", "poses of groups"
+__all__ = ["ENTRIES", "PLATES", "POSES", "POSITIONS", "entries", "entry_of"]
+
 _ALL = Told("exact", "all poses", "central")
 _RADIUS = Told("radius", "all poses", "central")
 _SENSING = Told("seen", "own sensing", "each robot")
@@ -73,23 +82,37 @@ ENTRIES = (
 )
 
 
-def entries(names: tuple[str, ...] = ()) -> tuple[Entry, ...]:
-    """The rows that the suite brings, and those of other people by ``MODULE:ATTRIBUTE``.
-
-    names: built-in rows to take, and further rows; all built-in ones where none is built in.
+def entry_of(name: str) -> Entry:
+    """A row that the suite brings, by name, or one of somebody else by ``MODULE:ATTRIBUTE``.
 
     Raises
     ------
-    SettingsError: a name that is neither; two rows of one name.
+    SettingsError: there is none.
     """
     known = {e.name: e for e in ENTRIES}
-    chosen = [known[n] for n in names if n in known]
-    further = [entry_from_outside(n) for n in names if n not in known and ":" in n]
-    for name in names:
-        if name not in known and ":" not in name:
-            listed = ", ".join(known)
-            raise SettingsError(f"no method called '{name}'; known: {listed}, MODULE:ATTRIBUTE")
-    rows = (*(chosen or ENTRIES), *further)
-    if len({e.name for e in rows}) < len(rows):
-        raise SettingsError("two methods of the leaderboard have one name")
+    if name in known:
+        return known[name]
+    if ":" not in name:
+        listed = ", ".join(known)
+        raise SettingsError(f"no method called '{name}'; known: {listed}, MODULE:ATTRIBUTE")
+    return entry_from_outside(name)
+
+
+def entries(names: tuple[str, ...] = ()) -> dict[str, Entry]:
+    """Rows by what they are asked for; all that the suite brings where nothing is asked for.
+
+    Raises
+    ------
+    SettingsError: an unknown row, two of one name, one whose system does not exist.
+    """
+    rows = {name: entry_of(name) for name in names or tuple(e.name for e in ENTRIES)}
+    called = [e.name for e in rows.values()]
+    for name in called:
+        if called.count(name) > 1:
+            raise SettingsError(f"two methods of the leaderboard are called '{name}'")
+    for entry in rows.values():
+        try:
+            system_of(entry.system)
+        except SettingsError as error:
+            raise SettingsError(f"{entry.name}: {error}") from None
     return rows

@@ -7,6 +7,15 @@ from typing import Any
 from push_model.outside import from_outside
 from push_model.settings import SettingsError
 
+POSITIONS, POSES, PLATES = "positions", "poses of one robot", "poses of groups"
+KINDS = POSITIONS, POSES, PLATES
+"""Of contests."""
+_TOLD = {
+    "outline": ("exact", "radius", "seen"),
+    "robots": ("all poses", "mean and variance", "own sensing"),
+    "control": ("central", "each robot"),
+}
+
 
 @dataclass(frozen=True)
 class Told:
@@ -19,6 +28,12 @@ class Told:
     outline: str
     robots: str
     control: str
+
+    def __post_init__(self) -> None:
+        for name, known in _TOLD.items():
+            if getattr(self, name) not in known:
+                listed = ", ".join(f"'{k}'" for k in known)
+                raise SettingsError(f"told: {name}: expected {listed}, got {getattr(self, name)!r}")
 
     @property
     def text(self) -> str:
@@ -44,7 +59,7 @@ class Entry:
     """A row. system: of which nodes run, see ``push_bringup.systems``: a system or method by name,
     or ``MODULE:ATTRIBUTE``.
 
-    kinds: of contests that it takes part in, see ``contests.KINDS``. parameters: of its nodes, as
+    kinds: of contests that it takes part in, of ``KINDS``. parameters: of its nodes, as
     in a scenario, by kind of node. robot: type of its robots where it cannot drive those of the
     contest. disc: whether it believes the object to be its circumscribed disc. reconstructed:
     whether it is somebody else's method; such a row is ranked only with a reproduction that holds.
@@ -60,6 +75,12 @@ class Entry:
     disc: bool = False
     reconstructed: bool = False
     reproduction: Reproduction | None = None
+
+    def __post_init__(self) -> None:
+        for kind in self.kinds:
+            if kind not in KINDS:
+                listed = ", ".join(f"'{k}'" for k in KINDS)
+                raise SettingsError(f"{self.name}: unknown kind '{kind}'; known: {listed}")
 
     @property
     def ranked(self) -> bool:

@@ -1,18 +1,18 @@
 """One match: a method at a contest, with a seed, in the graph in lockstep."""
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from push_bringup.systems import OUTLINE_ESTIMATOR
-from push_job.method import Task
+from push_job.method import Task, method_spec
 from push_model.arrays import Array
 from push_scenario.bodies import load_robot
 from push_scenario.scenario import Scenario
 from push_study.experiments.swarm_outline import mistaken
 from push_study.leaderboard.contests import Contest, Problem, contest, straight
-from push_study.leaderboard.entries import POSITIONS, entries
+from push_study.leaderboard.entries import POSITIONS, entry_of
 from push_study.leaderboard.entry import Entry
 from push_study.pool import Row
 from push_study.team_run import OBJECT, made_scenario, run_team
@@ -52,7 +52,6 @@ def play(match: Match) -> Row:
     spent = time.process_time() - began
     away, turned = outcome.error
     near = away <= _SLACK * what.tolerance[0] and turned <= _SLACK * what.tolerance[1]
-    ways = np.array(outcome.trace.ways)[:, 0]
     row: Row = {
         "scenario": match.scenario,
         "seed": match.seed,
@@ -65,28 +64,25 @@ def play(match: Match) -> Row:
     if row["success"]:
         direct = straight(problem)
         row["lambda"] = outcome.charged * problem.robot.max_speed / direct
-        row["path_ratio"] = _length(ways) / direct
+        row["path_ratio"] = _length(np.array(outcome.trace.ways)[:, 0]) / direct
     elif outcome.success:
         row["reason"] = f"said it was done {1e3 * away:.0f} mm, {turned:.2f} rad off"
     return row
 
 
-def entry_of(name: str) -> Entry:
-    """By the name of a match."""
-    return entries((name,))[-1] if ":" in name else entries((name,))[0]
-
-
 def _scenario(match: Match, what: Contest, entry: Entry, problem: Problem) -> Scenario:
     robot = load_robot(entry.robot) if entry.robot else problem.robot
     parameters = {k: dict(v) for k, v in entry.parameters.items()}
-    own: dict[str, object] = {}
-    if what.kind == POSITIONS:
-        own = {"position_tolerance": what.tolerance[0], "orientation": False}
-        if entry.system == "swarm":
-            own["stalled"] = what.limit
-        elif entry.reconstructed:
-            own["seed"] = match.seed
-    if own:
+    spec = method_spec(entry.system)
+    if what.kind == POSITIONS and spec is not None:
+        rules = {
+            "position_tolerance": what.tolerance[0],
+            "orientation": False,
+            "stalled": what.limit,
+            "seed": match.seed,
+        }
+        known = {f.name for f in fields(spec.sections[""])} if "" in spec.sections else set()
+        own = {name: value for name, value in rules.items() if name in known}
         parameters[entry.system] = {**own, **parameters.get(entry.system, {})}
     return made_scenario(
         match.scenario,

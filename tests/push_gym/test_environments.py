@@ -37,7 +37,6 @@ def test_gymnasium_finds_nothing_to_say(system, action):
 def test_pettingzoo_finds_nothing_to_say(system):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        warnings.filterwarnings("ignore", "options: 'options' is not known")  # it hands that in
         parallel_api_test(parallel_env(system, horizon=2.0), num_cycles=60)
         parallel_seed_test(lambda: parallel_env(system, horizon=2.0), num_cycles=30)
 
@@ -202,6 +201,15 @@ def test_wrong_settings_are_named(values, told):
         ({"robots": [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]}, "robots"),
         ({"object": {"colour": "red"}}, "colour"),
         ({"object": {"mass": -1.0}}, "mass"),
+        ({"start": ["a", 0.0, 0.0]}, "start"),
+        ({"robots": [[0.0], [1.0, 2.0]]}, "robots"),
+        ({"start": [0.98, 0.0, 0.0]}, "start: the object would touch a wall"),
+        ({"goal": [0.0, 5.0, 0.0]}, "goal: the object would touch a wall"),
+        (
+            {"start": [0.0, 0.0, 0.0], "robots": [[0.01, 0.0, 0.0]]},
+            "robot 0 would be in the object",
+        ),
+        ({"robots": [[0.99, 0.0, 0.0]], "start": [0.0, 0.0, 0.0]}, "robot 0 would touch a wall"),
     ],
 )
 def test_wrong_options_are_named(options, told):
@@ -235,3 +243,55 @@ def test_all_names_are_registered():
     env.reset(seed=1)
     image = env.render()
     assert image.shape == (384, 480, 3) and len(np.unique(image.reshape(-1, 3), axis=0)) > 4
+
+
+def test_robots_may_touch_the_object_but_not_overlap_each_other():
+    touching = {"start": [0.0, 0.0, 0.0], "robots": [[-0.0951, 0.0, 0.0]]}
+    make("Single").reset(seed=1, options=touching)
+    stacked = {"start": [0.7, 0.0, 0.0], "robots": [[-0.5, 0, 0], [-0.45, 0, 0], [-0.5, 0.4, 0]]}
+    with pytest.raises(SettingsError, match="robot 1 would be in another one"):
+        make("Group").reset(seed=1, options=stacked)
+    with pytest.raises(SettingsError, match="expected a mapping"):
+        make("Single").unwrapped.reset(options=["start"])
+
+
+def test_fields_of_an_object_replace_those_of_the_present_one():
+    env = make("Single").unwrapped
+    env.reset(seed=1, options={"object": "plate_ellipse"})
+    before = env.arena.item
+    env.reset(seed=1, options={"object": {"floor_friction": 0.45}})
+    assert env.arena.item.floor_friction == 0.45 and env.arena.item.mass == before.mass
+    assert np.array_equal(env.arena.item.outline, before.outline)
+
+
+@pytest.mark.parametrize("action", [[0.1, 0.2, 0.3], [0.1], 0.5, [math.nan, 0.0]])
+def test_actions_of_another_size_are_refused(action):
+    env = make("Single").unwrapped
+    env.reset(seed=1)
+    with pytest.raises(ValueError, match="action: expected"):
+        env.step(np.array(action))
+    many = vector("Single", 3)
+    many.reset(seed=1)
+    with pytest.raises(ValueError, match="action: expected 6 numbers"):
+        many.unwrapped.step(np.zeros((3, 1)))
+
+
+def test_what_many_rooms_and_many_agents_refuse():
+    with pytest.raises(SettingsError, match="num_envs"):
+        push_gym.PlanarPushVectorEnv(0)
+    with pytest.raises(SettingsError, match="render_mode"):
+        push_gym.PlanarPushVectorEnv(2, render_mode="rgb_array")
+    many = vector("Single", 3)
+    with pytest.raises(ValueError, match="seed: expected one for each of 3 rooms"):
+        many.unwrapped.reset(seed=[1, 2])
+    first, _ = many.reset(seed=np.int64(4))
+    second, _ = many.reset(seed=[4, 5, 6])
+    assert np.array_equal(first["observation"], second["observation"])
+    agents = parallel_env("group")
+    agents.reset(seed=1)
+    with pytest.raises(ValueError, match="no agent called 'robot0'"):
+        agents.step({"robot0": np.zeros(2)})
+    with pytest.raises(ValueError, match="action: expected 2 numbers"):
+        agents.step({"robot_0": np.zeros(3)})
+    with pytest.raises(SettingsError, match="unknown key 'strat'"):
+        agents.reset(options={"strat": 1})

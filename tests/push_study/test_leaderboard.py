@@ -25,6 +25,9 @@ KIND = frozenset({POSITIONS})
 
 OUTSIDER = Entry("outsider", "swarm", RADIUS, KIND, "a file of somebody else")
 """As a user's file brings one."""
+AGAIN, LOST = replace(OUTSIDER, source="x"), replace(OUTSIDER, name="lost", system="nowhere")
+REFUSER = Entry("refuser", "gibbs", ALL, frozenset({POSES}))
+"""It takes no headings, and contests of poses have some."""
 
 
 def row(method, success, value, contest="open-square"):
@@ -117,17 +120,25 @@ def test_intervals_cover_what_they_say():
 
 
 def test_names_of_methods():
-    assert entries() == ENTRIES
-    assert [e.name for e in entries(("crescent", "group"))] == ["crescent", "group"]
-    outside = entries(("tests.push_study.test_leaderboard:OUTSIDER",))
-    assert outside[-1] == OUTSIDER and len(outside) == len(ENTRIES) + 1
+    assert tuple(entries().values()) == ENTRIES
+    assert [e.name for e in entries(("crescent", "group")).values()] == ["crescent", "group"]
+    name = "tests.push_study.test_leaderboard:OUTSIDER"
+    assert entries((name,)) == {name: OUTSIDER}
     with pytest.raises(SettingsError, match="no method called 'cresent'"):
         entries(("cresent",))
+    with pytest.raises(SettingsError, match="are called 'outsider'"):
+        entries((name, name.replace("OUTSIDER", "AGAIN")))
+    with pytest.raises(SettingsError, match=r"lost: .*nowhere"):
+        entries((name.replace("OUTSIDER", "LOST"),))
+    with pytest.raises(SettingsError, match="unknown kind 'position'"):
+        replace(OUTSIDER, kinds=frozenset({"position"}))
+    with pytest.raises(SettingsError, match=r"robots: expected .*, got 'rumours'"):
+        Told("seen", "rumours", "central")
     with pytest.raises(SettingsError, match="not an Entry"):
         entry_of("tests.push_study.test_leaderboard:ALL")
     with pytest.raises(SettingsError, match="no contest"):
         leaderboard.tasks(StudyOptions(("nowhere",), 1, 1, "", methods=("crescent",)))
-    with pytest.raises(SettingsError, match="none of these methods"):
+    with pytest.raises(SettingsError, match="'crescent' takes part in contests of positions"):
         leaderboard.tasks(StudyOptions(("env1",), 1, 1, "", methods=("crescent",)))
 
 
@@ -149,6 +160,36 @@ def test_the_parameters_of_an_entry_reach_its_method(monkeypatch):
         for key, value in entry.parameters.get(entry.system, {}).items():
             flat = told[key]
             assert value.items() <= flat.items(), entry.name
+
+
+def test_what_a_method_refuses_or_breaks_counts_against_it(monkeypatch):
+    name = "tests.push_study.test_leaderboard:REFUSER"
+    match = Match("env1", 1, "", name, "planar", "mild")
+    refused = leaderboard.trial(match)
+    assert not refused["success"] and refused["reason"].startswith("refused: ")
+    assert "crashed" not in refused and "lambda" not in refused
+    good = row("refuser", True, 2.0, "env1") | {"entry": name}
+    monkeypatch.setattr(leaderboard, "play", lambda task: 1 / 0)
+    broken = leaderboard.trial(match)
+    assert broken["crashed"] and "ZeroDivisionError" in broken["reason"]
+    (cell,) = cells([good, refused, broken], (REFUSER,), ["env1"])
+    assert (cell.successes, cell.trials) == (1, 3)
+    assert leaderboard.statistics([good, refused, broken])["env1, refuser"]["trials"] == 3
+
+
+def test_only_settings_that_a_method_has_are_set(monkeypatch):
+    seen = []
+
+    def spy(system, scenario, *_, **__):
+        seen.append(scenario.parameters.get(system, {}))
+        raise InterruptedError
+
+    monkeypatch.setattr("push_study.leaderboard.match.run_team", spy)
+    for method in ("crescent", "occlusion", "global input"):
+        with pytest.raises(InterruptedError):
+            play(Match("open-square", 7, "", method, "planar", "mild"))
+    assert seen[0]["stalled"] == 300.0 and "seed" not in seen[0]
+    assert seen[1] == seen[2] == {"position_tolerance": 0.1, "orientation": False, "seed": 7}
 
 
 @pytest.mark.long
