@@ -1,8 +1,11 @@
 """PushT, a public task: a disc pushes a T to its place, in gym-pusht's own simulation.
 
-The task, its physics and its measure of success are gym-pusht's (IoU of at least 0.95 within 300
-steps of 0.1 s); nothing of it is changed. The planner sees the state of the environment, which is
-the place of the disc and the pose of the T, and makes every action.
+The task, its physics and its measure of success are gym-pusht's (the T covers more than 0.95 of its
+place within 300 steps of 0.1 s); nothing of it is changed. The planner sees the state of the
+environment, which is the place of the disc and the pose of the T, and makes every action.
+
+The scenario ``pusht-iou`` asks for more: an intersection over union of 0.95, which is a coverage of
+0.974. The environment is then stepped on after it calls itself solved.
 """
 
 import math
@@ -24,9 +27,11 @@ from push_study.statistics import wilson
 from push_study.study import StudyOptions
 
 SCENARIOS = ("pusht",)
+COVERAGE = {"pusht": 0.95, "pusht-iou": 2.0 * 0.95 / 1.95}
+"""Of its place by the T that counts, by scenario."""
 OPTIONS: dict[str, str] = {}
 PUBLISHED = 0.64
-"""Share of successes at this IoU that is quoted of a diffusion policy, over 500 seeds."""
+"""Share of successes that is quoted of a diffusion policy, over 500 seeds."""
 STEPS = 300
 """Actions of an episode at most, as of gym-pusht's registration."""
 
@@ -48,7 +53,7 @@ _NOWHERE = np.array([[-1e5, -1e5, 0.0, 0.0, 0.0, 0.0]])
 
 @dataclass(frozen=True)
 class PushTTask:
-    """An episode. scenario: "pusht"."""
+    """An episode. scenario: of ``COVERAGE``."""
 
     scenario: str
     seed: int
@@ -62,9 +67,15 @@ def ready() -> None:
 
 def tasks(options: StudyOptions) -> list[PushTTask]:
     """As many episodes; raises SettingsError for another scenario."""
-    if options.scenarios != SCENARIOS:
-        raise SettingsError("'pusht' has one scenario, 'pusht'; leave --scenarios out")
-    return [PushTTask("pusht", options.seed + k, str(options.out)) for k in range(options.trials)]
+    for name in options.scenarios:
+        if name not in COVERAGE:
+            known = ", ".join(COVERAGE)
+            raise SettingsError(f"no scenario called '{name}'; expected one of: {known}")
+    return [
+        PushTTask(name, options.seed + k, str(options.out))
+        for name in options.scenarios
+        for k in range(options.trials)
+    ]
 
 
 def _environment() -> Any:
@@ -104,41 +115,47 @@ def trial(task: PushTTask) -> Row:
     """One episode. The disc's velocity, which is not observed, follows from the actions."""
     env, chooser = _environment(), planner()
     seen, _ = env.reset(seed=task.seed)
-    velocity, best, spent = np.zeros(2), 0.0, 0.0
-    solved, steps = False, 0
-    while not solved and steps < STEPS:
+    velocity, best, spent, steps = np.zeros(2), 0.0, 0.0, 0
+    while best <= COVERAGE[task.scenario] and steps < STEPS:
         steps += 1
         disc = np.concatenate([seen[:2], velocity])
         began = time.thread_time()
         action = np.clip(chooser.target(to_mass(seen[2:5]), disc), 0.0, 512.0)
         spent += time.thread_time() - began
         velocity = moved(disc, action)[2:]
-        seen, _, solved, _, info = env.step(action)
+        seen, _, _, _, info = env.step(action)
         best = max(best, float(info["coverage"]))
+    solved = best > COVERAGE[task.scenario]
     return {
         "scenario": task.scenario,
         "seed": task.seed,
-        "success": bool(solved),
-        "reason": "" if solved else f"IoU of at most {best:.3f} in {STEPS} steps",
+        "success": solved,
+        "reason": "" if solved else f"coverage of at most {best:.3f} in {STEPS} steps",
         "steps": steps,
-        "best_iou": best,
+        "best_coverage": best,
         "cpu_s": spent,
     }
 
 
 def statistics(rows: list[Row]) -> dict[str, Any]:
     """Share of successes with its interval."""
-    good = sum(bool(r["success"]) for r in rows)
-    return {"wilson": wilson(good, len(rows)), "published": PUBLISHED}
+    found: dict[str, Any] = {"published": PUBLISHED}
+    for name in COVERAGE:
+        mine = [bool(r["success"]) for r in rows if r["scenario"] == name]
+        if mine:
+            found[f"wilson_{name}"] = wilson(sum(mine), len(mine))
+    return found
 
 
 def conclude(options: StudyOptions, tasks: Sequence[PushTTask], rows: list[Row]) -> None:
     """Success and steps beside the published figure."""
-    good = [r for r in rows if r["success"]]
-    low, high = wilson(len(good), len(rows))
-    print(f"\nsolved {len(good)} of {len(rows)} ({low:.3f} to {high:.3f}); published {PUBLISHED}")
-    if good:
-        steps = np.array([r["steps"] for r in good])
-        cpu = np.array([r["cpu_s"] for r in rows])
-        print(f"steps: median {np.median(steps):.0f}, largest {steps.max()}, of {STEPS}")
-        print(f"CPU time of an episode: median {np.median(cpu):.2f} s, largest {cpu.max():.2f} s")
+    for name in options.scenarios:
+        mine = [r for r in rows if r["scenario"] == name]
+        good = [r for r in mine if r["success"]]
+        low, high = wilson(len(good), len(mine))
+        print(f"\n{name}: solved {len(good)} of {len(mine)} ({low:.3f} to {high:.3f})")
+        if good:
+            steps, cpu = (np.array([r[k] for r in good]) for k in ("steps", "cpu_s"))
+            print(f"steps: median {np.median(steps):.0f}, largest {steps.max()}, of {STEPS}")
+            print(f"CPU time: median {np.median(cpu):.2f} s, largest {cpu.max():.2f} s")
+    print(f"\na diffusion policy is quoted with {PUBLISHED} of pusht")
