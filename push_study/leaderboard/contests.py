@@ -96,7 +96,7 @@ def _group(world: str) -> Callable[[int], Problem]:
 def _positions(item: str, words: str) -> Contest:
     what = (
         f"20 robots bring {words} 2 m across an empty room of {SIZE:.0f} m; any heading; robots "
-        "start within 1 m of it"
+        "start in a square of 2.2 m about it"
     )
     name = f"open-{item.split('_')[1]}"
     return Contest(name, POSITIONS, what, (_REACHED, math.inf), _LIMIT, _swarm(item))
