@@ -25,7 +25,10 @@ def towards_the_goal(env):
     return np.clip(se2.between(here, goal) / [REACH, REACH, TURN], -1.0, 1.0)
 
 
-@pytest.mark.parametrize("system", ["Single", "Group", "Swarm"])
+SYSTEMS = ["Single", *(pytest.param(s, marks=pytest.mark.long) for s in ("Group", "Swarm"))]
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
 def test_a_script_of_three_lines_reaches_the_goal(system):
     env = gymnasium.make(f"PlanarPush/{system}-v0", action="push", horizon=900.0)
     env.reset(seed=2)
@@ -48,7 +51,7 @@ def test_a_push_that_cannot_be_done_says_why_and_moves_nothing():
     assert info["time"] > 0.0, "time passes, or an agent could be refused for ever"
 
 
-@pytest.mark.parametrize("system", ["Single", "Group", "Swarm"])
+@pytest.mark.parametrize("system", SYSTEMS)
 def test_equal_seeds_give_equal_pushes_whatever_was_before(system):
     ends = []
     env = gymnasium.make(f"PlanarPush/{system}-v0", action="push")
