@@ -59,7 +59,8 @@ reconstruction of it reaches the figure of its own paper. Λ is the time until t
 CPU time of planning included, over the time of a robot at full speed on the straight line; it is
 the mean over the matches that reach the goal. <em>Leads</em> names the ranked methods of the same
 information whose interval lies entirely on the worse side. CPU is that of the whole match, the
-simulation included; it is the only column that differs between two runs with equal seeds.</p>"""
+simulation included. Two runs with equal seeds differ only in CPU times, and by these in the
+planning that Λ and time contain.</p>"""
 
 _SORT = """"use strict";
 for (const head of document.querySelectorAll("table.sortable th")) {
