@@ -7,7 +7,7 @@ engines with full damping, has the limit surface of F^2 : T^2 = m : I; what foll
 
 The disc is driven by a PD law towards a target and nothing stops it. Where it gets into the object,
 the object recedes as fast as the disc comes, and a part of the overlap is made good at each step,
-as sequential-impulse engines do. Any unit of length will do, the same for all.
+as sequential-impulse engines do. Poses and places are in one fixed frame.
 """
 
 import math
@@ -24,9 +24,9 @@ _TURNS = 4  # over the parts of an object in a step
 
 
 class Body(NamedTuple):
-    """An object about its centre of mass: corners ``(v, 2)`` of its convex parts in turn, first,
-    count ``(p,)``: whose they are. mobility: translation per impulse; spin: turn per moment of one;
-    only their ratio matters."""
+    """An object about its centre of mass: corners ``(v, 2)`` [m] of its convex parts in turn,
+    first, count ``(p,)``: whose they are. mobility: translation per impulse; spin: turn per moment
+    of one; only their ratio [1/m^2] matters."""
 
     corners: Any
     first: Any
@@ -36,8 +36,8 @@ class Body(NamedTuple):
 
 
 class Disc(NamedTuple):
-    """A pusher: radius; gains of its PD law [1/s^2], [1/s]; step [s]; recovery: part of an overlap
-    that is made good in a step, but for ``slop``."""
+    """A pusher: radius [m]; gains of its PD law [1/s^2], [1/s]; step [s]; recovery: part of an
+    overlap that is made good in a step, but for ``slop`` [m]."""
 
     radius: float
     stiffness: float
@@ -49,8 +49,8 @@ class Disc(NamedTuple):
 
 @dataclass(frozen=True)
 class Pushed:
-    """Where objects and discs are after their pushes: poses ``(n, 6)`` x, y, heading and their
-    rates, discs ``(n, 4)`` x, y and their rates; touched ``(n,)``."""
+    """Where objects and discs are after their pushes: poses ``(n, 6)`` x, y [m], heading [rad] and
+    their rates, discs ``(n, 4)`` x, y [m] and their rates; touched ``(n,)``."""
 
     poses: Array
     discs: Array
@@ -58,8 +58,8 @@ class Pushed:
 
 
 def body(outline: Array, gyration: float) -> Body:
-    """A body from its outline ``(n, 2)`` about the centre of mass, and its radius of gyration,
-    which for a limit surface is T / F."""
+    """A body from its outline ``(n, 2)`` [m] about the centre of mass, and its radius of gyration
+    [m], which for a limit surface is T / F."""
     parts = [np.asarray(p, dtype=np.float64) for p in convex_parts(outline)]
     count = np.array([len(p) for p in parts], dtype=np.int64)
     first = np.concatenate([[0], np.cumsum(count)[:-1]]).astype(np.int64)
@@ -72,6 +72,14 @@ def push(item: Body, disc: Disc, poses: Array, discs: Array, targets: Array, ste
     after, moved = np.array(poses, dtype=np.float64), np.array(discs, dtype=np.float64)
     touched = _push_all(item, disc, after, moved, np.asarray(targets, dtype=np.float64), steps)
     return Pushed(after, moved, touched)
+
+
+def driven(disc: Disc, at: Array, target: Array, steps: int) -> Array:
+    """Place and velocity ``(4,)`` of a disc after so many steps towards a target ``(2,)``."""
+    after = np.array(at, dtype=np.float64)
+    for _ in range(steps):
+        _drive(disc, after, target)
+    return after
 
 
 def placed(item: Body, pose: Array) -> Array:
@@ -118,12 +126,19 @@ def gap(x: float, y: float, corners: Any, first: Any, count: Any) -> Any:
 
 
 @numba.njit(cache=True, error_model="numpy")
+def _drive(disc: Disc, at: Any, target: Any) -> None:
+    """One step of a disc, in place."""
+    for j in range(2):
+        pull = disc.stiffness * (target[j] - at[j]) - disc.damping * at[2 + j]
+        at[2 + j] += disc.step * pull
+        at[j] += disc.step * at[2 + j]
+
+
+@numba.njit(cache=True, error_model="numpy")
 def _step(item: Body, disc: Disc, pose: Any, at: Any, target: Any, corners: Any) -> bool:
     """One step of one disc and one object, in place; whether they touch."""
     dt = disc.step
-    for j in range(2):
-        at[2 + j] += dt * (disc.stiffness * (target[j] - at[j]) - disc.damping * at[2 + j])
-        at[j] += dt * at[2 + j]
+    _drive(disc, at, target)
     for j in range(3):
         pose[j] += dt * pose[3 + j]
         pose[3 + j] = 0.0

@@ -8,16 +8,18 @@ controller by enumeration. A push ends when no target brings the object nearer.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from push_model import se2
 from push_model.arrays import Array
-from push_model.point_push import Body, Disc, body, gap, placed, push
+from push_model.free_space import FreeSpace, Obstacles
+from push_model.occupancy import OccupancyGrid
+from push_model.point_push import Disc, Pushed, body, gap, placed, push
 from push_model.se2 import transform
 from push_model.settings import bounded, settings
-from push_planner.point_way import Ways
 
 
 @settings
@@ -65,9 +67,12 @@ class PointPushSettings:
 
 @dataclass(frozen=True)
 class PointTask:
-    """outline ``(n, 2)`` of the object about its centre of mass; gyration: see
-    ``push_model.point_push.body``; goal ``(3,)`` of the centre of mass; room: least and greatest x
-    and y; period: steps of the disc between two frames."""
+    """A task in one frame, that of the room.
+
+    outline ``(n, 2)`` [m] of the object about its centre of mass, counter-clockwise; gyration: [m],
+    see ``push_model.point_push.body``; goal ``(3,)`` [m, m, rad] of the centre of mass; room: least
+    and greatest x and y [m] of the disc's centre; period: steps of the disc between two frames.
+    """
 
     outline: Array
     gyration: float
@@ -80,10 +85,13 @@ _ARRIVED, _SLOW = 0.13, 4.0  # radii from the start of a push; radii a second th
 _PATIENCE, _LONGEST = 25, 14  # frames on the way to a push; frames of a push
 _AVOID = 0.5  # radii about the start of a push in vain
 _COAST = 25  # steps for which a target on the way must be free of contact
+_KEEP = 1.1  # radii that the disc's centre keeps from the object on its ways
+_CELL, _PLACES = 0.25, 0.5  # radii of a cell of the map; between places of the search
 _WAY_SPACING = 0.8  # radii between targets on a way
 _OUTSIDE = 3.0  # cost of a corner outside the room, of how far it is
 _NEVER = 1e6
 _WALL = 0.25  # radii that corners keep from the walls
+_ROUNDS = 12  # changes of what it is about, in one frame
 
 
 class PointPusher:
@@ -92,61 +100,36 @@ class PointPusher:
     def __init__(self, task: PointTask, disc: Disc, options: PointPushSettings | None = None):
         self._task, self._disc = task, disc
         self._options = options or PointPushSettings()
-        self._item: Body = body(task.outline, task.gyration)
-        r = disc.radius
-        self._ways = Ways(self._item, task.outline, r, (task.room[0] + 0.1, task.room[1] - 0.1))
+        self._item = body(task.outline, task.gyration)
+        self._space = self._free_space()
         self._starts, self._ends = self._candidates()
-        self._start = np.zeros(2)
-        self._target = np.zeros(2)
-        self._frames = 0
-        self._state = "plan"
+        self._do: Callable[[Array, Array], Array | None] = self._plan  # what it is about
+        self._start = self._target = np.zeros(2)  # of the push that it is about
+        self._frames = 0  # on the way, or of the push
+        self._before = math.inf  # cost when the push under way began
         self._vain: list[Array] = []  # starts, in the object's frame, of pushes that gained nothing
-        self._last = math.inf  # cost when the push under way began
 
     def target(self, pose: Array, disc: Array) -> Array:
-        """The disc's next target ``(2,)``. pose ``(3,)`` of the object's centre of mass; disc
-        ``(4,)``: place and velocity."""
-        for _ in range(4):
-            if self._state == "plan":
-                self._plan(pose, disc)
-                self._frames = 0
-            if self._state == "way":
-                self._frames += 1
-                r = self._disc.radius
-                slow = np.hypot(disc[2], disc[3]) < _SLOW * r
-                if np.hypot(*(disc[:2] - self._start)) < _ARRIVED * r and slow:
-                    self._state, self._frames = "push", 0
-                    self._last = self._now(pose)
-                elif self._frames > _PATIENCE:
-                    self._state = "plan"
-                    continue
-                else:
-                    on_way = self._along(pose, disc)
-                    if on_way is not None:
-                        return on_way
-                    self._state = "plan"
-                    continue
-            if self._state == "push":
-                onward = self._press(pose, disc)
-                if onward is not None:
-                    return onward
-                self._remember(pose)
-                self._state = "plan"
+        """The disc's next target ``(2,)`` [m]. pose ``(3,)`` of the object's centre of mass; disc
+        ``(4,)``: place [m] and velocity [m/s]."""
+        for _ in range(_ROUNDS):
+            told = self._do(pose, disc)
+            if told is not None:
+                return told
         return np.array(disc[:2])
 
-    def _now(self, pose: Array) -> float:
-        return float(self.cost(pose[None, :3])[0])
-
-    def _remember(self, pose: Array) -> None:
-        """Do not begin again where a push has gained nothing, until another one has gained."""
-        if self._now(pose) < self._last - self._options.least_gain * self._disc.radius:
-            self._vain.clear()
-        else:
-            self._vain.append(transform(se2.inverse(pose[:3]), self._start[None])[0])
+    def _free_space(self) -> FreeSpace:
+        """Where the disc's centre may be, without the object: nothing is in the room."""
+        r, (low, high) = self._disc.radius, self._task.room
+        cell, margin = _CELL * r, _KEEP * r  # the edge of a map is a wall
+        count = math.ceil((high - low + 2.0 * margin) / cell)
+        free = np.zeros((count, count), dtype=np.bool_)
+        corner = np.full(2, low - margin)
+        return FreeSpace(OccupancyGrid(free, cell, corner), _PLACES * r)
 
     def cost(self, poses: Array) -> Array:
-        """``(n,)`` distances of poses ``(n, 3+)`` from the goal, a turn counted by the radius of
-        gyration, with a charge for corners outside the room."""
+        """``(n,)`` [m] distances of poses ``(n, 3+)`` from the goal, a turn counted by the radius
+        of gyration, with a charge for corners outside the room."""
         goal, lever = self._task.goal, self._task.gyration
         away = (poses[:, 0] - goal[0]) ** 2 + (poses[:, 1] - goal[1]) ** 2
         value = np.sqrt(away + 2.0 * lever**2 * (1.0 - np.cos(poses[:, 2] - goal[2])))
@@ -195,47 +178,57 @@ class PointPusher:
         costs = self.cost(after.poses) + _NEVER * off
         return starts, ends, after.poses, costs
 
-    def _plan(self, pose: Array, disc: Array) -> None:
-        o = self._options
+    def _plan(self, pose: Array, disc: Array) -> Array | None:
+        """Choose a push, and be on the way to it."""
+        o, r = self._options, self._disc.radius
         starts, ends, after, costs = self._pushes(pose)
-        straight = np.hypot(*(starts - disc[:2]).T)
         for place in self._vain:
             here = transform(pose[:3], place[None])[0]
-            vain = np.hypot(*(starts - here).T) < _AVOID * self._disc.radius
-            costs = costs + _NEVER * vain
+            costs = costs + _NEVER * (np.hypot(*(starts - here).T) < _AVOID * r)
+        straight = np.hypot(*(starts - disc[:2]).T)
         order = np.argsort(costs + o.way_cost * straight, kind="stable")[: o.followed]
-        near = 0.0 if self._vain else o.near * self._disc.radius
+        near = 0.0 if self._vain else o.near * r
+        here = Obstacles((transform(pose[:3], self._task.outline),))
+        reach = self._space.from_here(disc[:2], _KEEP * r, here)
         best, value = -1, math.inf
         for k in order:
             worth = float(costs[k])
             if worth > near:
                 second = float(self._pushes(after[k])[3].min())
                 worth = min(worth, 0.7 * second + 0.3 * worth)
-            worth += o.way_cost * self._ways.find(pose, disc[:2], starts[k])[1]
+            way = reach.way_to(starts[k])
+            if way is None:
+                continue
+            worth += o.way_cost * float(np.hypot(*np.diff(way, axis=0).T).sum())
             if worth < value:
                 best, value = int(k), worth
         if best < 0 or costs[best] >= _NEVER:
             self._vain.clear()
-            return
+            return None
         self._start, self._target = starts[best], ends[best]
-        self._state = "way"
+        self._frames, self._do = 0, self._along
+        return None
 
     def _along(self, pose: Array, disc: Array) -> Array | None:
-        """The farthest target on the way to the push that lets the disc touch nothing."""
-        way, _ = self._ways.find(pose, disc[:2], self._start)
-        if not len(way):
+        """The farthest target on the way to the push that lets the disc touch nothing; None where
+        it has arrived, or cannot go on."""
+        r = self._disc.radius
+        self._frames += 1
+        slow = np.hypot(disc[2], disc[3]) < _SLOW * r
+        if slow and np.hypot(*(disc[:2] - self._start)) < _ARRIVED * r:
+            self._frames, self._before, self._do = 0, self._now(pose), self._press
             return None
-        spacing = _WAY_SPACING * self._disc.radius
+        here = Obstacles((transform(pose[:3], self._task.outline),))
+        way = self._space.from_here(disc[:2], _KEEP * r, here).way_to(self._start)
+        if way is None or self._frames > _PATIENCE:
+            self._do = self._plan
+            return None
         points = []
         for a, b in zip(way[:-1], way[1:], strict=True):
-            parts = max(1, int(np.hypot(*(b - a)) / spacing))
+            parts = max(1, int(np.hypot(*(b - a)) / (_WAY_SPACING * r)))
             points += [a + (k + 1) / parts * (b - a) for k in range(parts)]
         targets = np.array(points[::-1])
-        n = len(targets)
-        poses = np.zeros((n, 6))
-        poses[:, :3] = pose
-        steps = self._task.period + _COAST
-        after = push(self._item, self._disc, poses, np.tile(disc, (n, 1)), targets, steps)
+        after = self._pushed(pose, disc, targets, self._task.period + _COAST)
         free = np.flatnonzero(np.logical_not(after.touched))
         target: Array = targets[free[0]] if len(free) else way[1]
         return target
@@ -252,14 +245,29 @@ class PointPusher:
         low, high = self._task.room
         targets = np.vstack([self._target, disc[:2] + fan.reshape(-1, 2)])
         targets = np.clip(targets, low + 0.05 * r, high - 0.05 * r)
-        n = len(targets)
-        poses = np.zeros((n, 6))
-        poses[:, :3] = pose
-        after = push(i, self._disc, poses, np.tile(disc, (n, 1)), targets, o.control_horizon)
-        costs = self.cost(after.poses)
-        now = float(self.cost(poses[:1])[0])
-        k, self._frames = int(costs.argmin()), self._frames + 1
+        costs = self.cost(self._pushed(pose, disc, targets, o.control_horizon).poses)
+        now, k = self._now(pose), int(costs.argmin())
+        self._frames += 1
         if costs[k] > now - max(o.least_gain * r, 0.02 * now) or self._frames > _LONGEST:
+            self._remember(pose)
+            self._do = self._plan
             return None
         self._target = targets[k]
         return self._target
+
+    def _pushed(self, pose: Array, disc: Array, targets: Array, steps: int) -> Pushed:
+        """After steps of the disc towards each of the targets ``(n, 2)`` [m]."""
+        n = len(targets)
+        poses = np.zeros((n, 6))
+        poses[:, :3] = pose
+        return push(self._item, self._disc, poses, np.tile(disc, (n, 1)), targets, steps)
+
+    def _now(self, pose: Array) -> float:
+        return float(self.cost(pose[None, :3])[0])
+
+    def _remember(self, pose: Array) -> None:
+        """Do not begin again where a push has gained nothing, until another one has gained."""
+        if self._now(pose) < self._before - self._options.least_gain * self._disc.radius:
+            self._vain.clear()
+        else:
+            self._vain.append(transform(se2.inverse(pose[:3]), self._start[None])[0])

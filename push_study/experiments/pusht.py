@@ -19,7 +19,7 @@ import numpy as np
 
 from push_model import se2
 from push_model.arrays import Array
-from push_model.point_push import Disc, body, push
+from push_model.point_push import Disc, driven
 from push_model.settings import SettingsError
 from push_planner.point_pusher import PointPusher, PointTask
 from push_study.pool import Row
@@ -35,20 +35,22 @@ PUBLISHED = 0.64
 STEPS = 300
 """Actions of an episode at most, as of gym-pusht's registration."""
 
-T = np.array(
-    [(-60, 0), (60, 0), (60, 30), (15, 30), (15, 120), (-15, 120), (-15, 30), (-60, 30)],
-    dtype=np.float64,
+SCALE = 1e-3
+"""[m] of a pixel, which is gym-pusht's unit: nothing of the task depends on it."""
+T = SCALE * np.array(
+    [(-60, 0), (60, 0), (60, 30), (15, 30), (15, 120), (-15, 120), (-15, 30), (-60, 30)]
 )
-"""Outline of gym-pusht's T in its frame, in its units (pixels)."""
-CENTRE = np.array([0.0, 45.0])
-"""Of mass."""
-_MASS, _INERTIA = 1.0, 3000.0
-_GOAL = np.array([256.0, 256.0, 0.25 * math.pi])
-_ROOM = (1.0, 511.0)
+"""``(8, 2)`` [m] outline of gym-pusht's T in its frame."""
+CENTRE = SCALE * np.array([0.0, 45.0])
+"""``(2,)`` [m] of mass."""
+MASS, INERTIA = 1.0, 3000.0
+"""As gym-pusht gives them to its engine: per pixel squared."""
+GYRATION = SCALE * math.sqrt(INERTIA / MASS)  # [m]
+_GOAL = np.array([SCALE * 256.0, SCALE * 256.0, 0.25 * math.pi])
+_ROOM = (SCALE * 1.0, SCALE * 511.0)
 _PERIOD = 10  # steps of the physics in an action
 _RECOVERY = 1.0 - (0.9**60) ** 0.01  # pymunk's default bias for a step of 0.01 s
-DISC = Disc(15.0, 100.0, 20.0, 0.01, _RECOVERY, 0.1)
-_NOWHERE = np.array([[-1e5, -1e5, 0.0, 0.0, 0.0, 0.0]])
+DISC = Disc(SCALE * 15.0, 100.0, 20.0, 0.01, _RECOVERY, SCALE * 0.1)
 
 
 @dataclass(frozen=True)
@@ -99,16 +101,7 @@ def to_mass(pose: Array) -> Array:
 
 def planner() -> PointPusher:
     """For PushT."""
-    task = PointTask(T - CENTRE, math.sqrt(_INERTIA / _MASS), to_mass(_GOAL), _ROOM, _PERIOD)
-    return PointPusher(task, DISC)
-
-
-def moved(disc: Array, target: Array) -> Array:
-    """Place and velocity ``(4,)`` of the disc after an action; nothing stops it."""
-    item = body(T - CENTRE, math.sqrt(_INERTIA / _MASS))
-    after = push(item, DISC, _NOWHERE, disc[None], target[None], _PERIOD)
-    found: Array = after.discs[0]
-    return found
+    return PointPusher(PointTask(T - CENTRE, GYRATION, to_mass(_GOAL), _ROOM, _PERIOD), DISC)
 
 
 def trial(task: PushTTask) -> Row:
@@ -118,11 +111,13 @@ def trial(task: PushTTask) -> Row:
     velocity, best, spent, steps = np.zeros(2), 0.0, 0.0, 0
     while best <= COVERAGE[task.scenario] and steps < STEPS:
         steps += 1
-        disc = np.concatenate([seen[:2], velocity])
+        disc = np.concatenate([SCALE * seen[:2], velocity])
         began = time.thread_time()
-        action = np.clip(chooser.target(to_mass(seen[2:5]), disc), 0.0, 512.0)
+        item = to_mass(seen[2:5] * [SCALE, SCALE, 1.0])
+        target = np.clip(chooser.target(item, disc), 0.0, SCALE * 512.0)
         spent += time.thread_time() - began
-        velocity = moved(disc, action)[2:]
+        velocity = driven(DISC, disc, target, _PERIOD)[2:]
+        action = target / SCALE
         seen, _, _, _, info = env.step(action)
         best = max(best, float(info["coverage"]))
     solved = best > COVERAGE[task.scenario]

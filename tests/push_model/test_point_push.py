@@ -8,7 +8,7 @@ import pytest
 
 from push_model import se2
 from push_model.outlines import distance, inside
-from push_model.point_push import Disc, body, gap, placed, push
+from push_model.point_push import Disc, body, driven, gap, placed, push
 from push_model.shape_specs import PolygonShape
 from push_model.specs import EnvironmentSpec, ObjectSpec
 from push_scenario.bodies import load_robot
@@ -66,6 +66,16 @@ def test_a_push_moves_the_object_as_its_limit_surface_says():
         scale = twist @ expected / (expected @ expected)
         assert twist == pytest.approx(scale * expected, abs=2e-3 * np.abs(twist).max())
         assert scale > 0.0
+
+
+def test_a_disc_alone_goes_to_its_target():
+    after = driven(DISC, np.array([0.1, 0.2, 0.0, 0.0]), np.array([0.3, 0.1]), 200)
+    assert after == pytest.approx([0.3, 0.1, 0.0, 0.0], abs=1e-6)
+    item, poses, discs = body(OUTLINE, GYRATION), np.zeros((1, 6)), np.array([[0.3, 0.0, 0.1, 0.2]])
+    beside = push(item, DISC, poses, discs, np.array([[0.5, 0.1]]), 30)
+    assert not beside.touched[0]
+    alone = driven(DISC, discs[0], np.array([0.5, 0.1]), 30)
+    assert np.array_equal(alone, beside.discs[0])
 
 
 def test_what_is_not_touched_does_not_move_and_nothing_that_is_given_changes():
