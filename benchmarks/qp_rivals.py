@@ -24,16 +24,12 @@ class Quadprog:
     ) -> DenseSolution:
         import quadprog
 
-        n = len(qp.f)
-        low, high = np.isfinite(qp.low), np.isfinite(qp.high)
-        eye = np.eye(n)
-        C = np.vstack([-G[equal], -G[~equal], eye[low], -eye[high]])
-        d = np.concatenate([-b[equal], -b[~equal], qp.low[low], -qp.high[high]])
+        A, d = _all_rows(qp, G, b, equal)
         try:
-            best = quadprog.solve_qp(qp.H, -qp.f, C.T, d, int(equal.sum()))[0]
+            best = quadprog.solve_qp(qp.H, -qp.f, -A.T, -d, int(equal.sum()))[0]
         except ValueError as error:
             return _failed(qp, b, f"quadprog: {error}")
-        return DenseSolution(best, np.zeros(n + len(b)), True, "quadprog")
+        return DenseSolution(best, np.zeros(len(qp.f) + len(b)), True, "quadprog")
 
 
 class Piqp:
@@ -115,11 +111,7 @@ class Clarabel:
     ) -> DenseSolution:
         import clarabel
 
-        n = len(qp.f)
-        low, high = np.isfinite(qp.low), np.isfinite(qp.high)
-        eye = np.eye(n)
-        A = np.vstack([G[equal], G[~equal], eye[high], -eye[low]])
-        d = np.concatenate([b[equal], b[~equal], qp.high[high], -qp.low[low]])
+        A, d = _all_rows(qp, G, b, equal)
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = _TOLERANCE
@@ -131,7 +123,14 @@ class Clarabel:
         answer = solver.solve()
         if str(answer.status) not in ("Solved", "AlmostSolved"):
             return _failed(qp, b, f"clarabel: {answer.status}")
-        return DenseSolution(np.array(answer.x), np.zeros(n + len(b)), True, "clarabel")
+        return DenseSolution(np.array(answer.x), np.zeros(len(qp.f) + len(b)), True, "clarabel")
+
+
+def _all_rows(qp: Any, G: Any, b: Any, equal: Any) -> tuple[Any, Any]:
+    """Equalities, then inequalities, then finite bounds as rows A z <= d."""
+    low, high, eye = np.isfinite(qp.low), np.isfinite(qp.high), np.eye(len(qp.f))
+    A = np.vstack([G[equal], G[~equal], eye[high], -eye[low]])
+    return A, np.concatenate([b[equal], b[~equal], qp.high[high], -qp.low[low]])
 
 
 def _failed(qp: Any, b: Any, status: str) -> DenseSolution:
@@ -143,12 +142,12 @@ RIVALS = {"quadprog": Quadprog, "piqp": Piqp, "proxqp": ProxQp, "clarabel": Clar
 """By the names of their modules."""
 
 
-def backend(name: str, every_row: bool = False) -> RowGeneration:
-    """One of them, with row generation or with every row.
+def backend(name: str) -> RowGeneration:
+    """One of them, with row generation.
 
     Raises
     ------
     ImportError: it is not installed.
     """
     __import__("proxsuite" if name == "proxqp" else name)
-    return RowGeneration(RIVALS[name](), every_row)
+    return RowGeneration(RIVALS[name]())

@@ -16,7 +16,7 @@ from push_model import se2
 
 def main(system: str = "Single", episodes: str = "5") -> bool:
     """Whether all episodes ended at the goal."""
-    assert f"PlanarPush/{system}-v0" in push_gym.ENVIRONMENTS
+    push_gym.register_all()
     env = gymnasium.make(f"PlanarPush/{system}-v0", action="push", horizon=900.0)
     reached = 0
     for seed in range(int(episodes)):

@@ -44,7 +44,7 @@ class Until(BaseCallback):
 
 def main(seconds: str = "600", file: str = "single_sac.zip") -> bool:
     """Whether training and test ended without an error."""
-    assert "PlanarPush/Single-v0" in push_gym.ENVIRONMENTS
+    push_gym.register_all()
     env = gymnasium.make("PlanarPush/Single-v0", reward="sparse", **ROOM, **TOLERANCES)
     model = SAC(
         "MultiInputPolicy",

@@ -4,7 +4,9 @@ import argparse
 import math
 import signal
 import sys
+import time
 from collections.abc import Callable
+from pathlib import Path
 
 from push_bringup.job_result import JobEvent
 from push_bringup.systems import SYSTEMS, system_names, system_of
@@ -59,6 +61,28 @@ def add_factor(parser: argparse.ArgumentParser) -> None:
 def add_timeout(parser: argparse.ArgumentParser, default: float) -> None:
     """``--timeout``."""
     parser.add_argument("--timeout", type=positive, default=default, help="[s] wall time to wait")
+
+
+def add_study(parser: argparse.ArgumentParser) -> None:
+    """``--seed``, ``--out``, ``--scheduler``, ``--workers``: where and how trials run."""
+    parser.add_argument("--seed", type=whole(0), default=1, help="seed of the first trial")
+    parser.add_argument(
+        "--out", default="", help="output folder; an interrupted study in it is continued"
+    )
+    parser.add_argument("--scheduler", default="", help="address of a Dask scheduler")
+    parser.add_argument(
+        "--workers", type=whole(0), default=0, help="local processes; 0: one per core"
+    )
+
+
+def study_folder(arguments: argparse.Namespace, name: str) -> Path:
+    """The folder of a study: the one that was asked for, or a new one."""
+    return Path(arguments.out or f"results/{name}-{time.strftime('%Y%m%d-%H%M%S')}")
+
+
+def names(text: str) -> tuple[str, ...]:
+    """Of a list with commas between them."""
+    return tuple(name.strip() for name in text.split(",") if name.strip())
 
 
 def positive(text: str) -> float:

@@ -1,24 +1,22 @@
 """Run seeded trials of a study; write summary, plots and a bag. Continues an interrupted study."""
 
 import argparse
-import time
 from pathlib import Path
 
-from planar_push.arguments import whole
+from planar_push.arguments import add_study, names, study_folder, whole
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this verb."""
     folder = Path(__file__).resolve().parents[1] / "push_study" / "experiments"
-    names = sorted(p.stem.replace("_", "-") for p in folder.glob("[a-z]*.py"))
-    parser.add_argument("name", metavar="NAME", help=f"one of: {', '.join(names)}")
+    known = sorted(p.stem.replace("_", "-") for p in folder.glob("[a-z]*.py"))
+    parser.add_argument("name", metavar="NAME", help=f"one of: {', '.join(known)}")
     parser.add_argument(
         "--scenarios", default="", help="comma-separated scenarios; default: those of the study"
     )
     parser.add_argument(
         "--trials", type=whole(1), default=5, help="number of trials of each scenario"
     )
-    parser.add_argument("--seed", type=whole(0), default=1, help="seed of the first trial")
     parser.add_argument(
         "--uncertainty",
         help="what the nodes do not know: none, mild, shape, hard or unknown (docs/results.md); "
@@ -27,26 +25,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--world", help="pybullet or planar; refused if the study supports only one"
     )
-    parser.add_argument(
-        "--out", default="", help="output folder; an interrupted study in it is continued"
-    )
-    parser.add_argument("--scheduler", default="", help="address of a Dask scheduler")
-    parser.add_argument(
-        "--workers", type=whole(0), default=0, help="local processes; 0: one per core"
-    )
+    add_study(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """0 when every trial was run and at least one succeeded."""
     from push_study.study import StudyOptions, complete, experiment, run_study
 
-    given = tuple(s for s in arguments.scenarios.split(",") if s)
-    out = arguments.out or f"results/{arguments.name}-{time.strftime('%Y%m%d-%H%M%S')}"
+    given, out = names(arguments.scenarios), study_folder(arguments, arguments.name)
     options = StudyOptions(
         given or experiment(arguments.name).SCENARIOS,
         arguments.trials,
         arguments.seed,
-        Path(out),
+        out,
         arguments.scheduler,
         arguments.workers,
         arguments.uncertainty or "mild",

@@ -60,10 +60,8 @@ def twists(level: str, robot: RobotSpec, actions: Array) -> Array:
     result = np.zeros((*told.shape[:-1], 3))
     if level == "wheels":
         drive = robot.differential
-        fastest = drive.max_wheel_speed
-        left, right = fastest * told[..., 0], fastest * told[..., 1]
-        result[..., 0] = (left + right) * drive.wheel_radius / 2.0
-        result[..., 2] = (right - left) * drive.wheel_radius / (2.0 * drive.half_track)
+        wheels: Array = drive.max_wheel_speed * told
+        result[..., 0], result[..., 2] = drive.twist(wheels[..., 0], wheels[..., 1])
         return result
     result[..., 0] = robot.max_speed * told[..., 0]
     if robot.kinematics is None:

@@ -6,15 +6,14 @@ import numpy as np
 
 from push_model import se2
 from push_model.arrays import Array
-from push_model.distance_field import DistanceField
+from push_model.free_space import FreeSpace
 from push_model.occupancy import rasterise
-from push_model.outlines import distance, inside, overlap
+from push_model.outlines import overlap
 from push_model.settings import SettingsError
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
+from push_scenario.scatter import scattered
 
-_TRIES = 64  # places that are drawn at once
-_GIVE_UP = 100  # such draws
-_GAP = 0.02  # [m] between bodies
+_TRIES = 5000  # places for the object
 _ROBOTS_ROOM = 2.5  # radii of a robot that fit between an object and a wall
 
 
@@ -22,7 +21,7 @@ class Draws:
     """Of one room. Poses are of bodies' frames."""
 
     def __init__(self, environment: EnvironmentSpec, robot: RobotSpec, item: ObjectSpec) -> None:
-        self._field = DistanceField(rasterise(environment))
+        self._space = FreeSpace(rasterise(environment))
         self._half = 0.5 * np.array(environment.size)
         self._radius, self._item, self._robot = robot.footprint_radius, item, robot
         reach = float(np.hypot(*item.outline.T).max())
@@ -35,17 +34,15 @@ class Draws:
         ------
         SettingsError: there is no such place.
         """
-        for _ in range(_GIVE_UP):
-            places = random.uniform(-self._half, self._half, (_TRIES, 2))
-            headings = random.uniform(-math.pi, math.pi, _TRIES)
-            for place, heading in zip(places, headings, strict=True):
-                if self._field.at(*place) > self._around:
-                    return np.array([*place, heading])
+        for _ in range(_TRIES):
+            place = random.uniform(-self._half, self._half)
+            if self._space.field.at(*place) > self._around:
+                return np.array([*place, random.uniform(-math.pi, math.pi)])
         raise SettingsError("room: the object and a robot beside it fit nowhere; enlarge it")
 
     def check(self, pose: Array, name: str) -> None:
         """Raise SettingsError if the object touches a wall at a pose ``(3,)``."""
-        if self._field.clearance(self._item.outline, pose) <= 0.0:
+        if self._space.field.clearance(self._item.outline, pose) <= 0.0:
             raise SettingsError(f"options: {name}: the object would touch a wall at {_told(pose)}")
 
     def check_robots(self, robots: Array, pose: Array) -> None:
@@ -53,7 +50,7 @@ class Draws:
         item = se2.transform(pose, self._item.outline)
         bodies = [se2.transform(r, self._robot.outline) for r in robots]
         for i, (robot, body) in enumerate(zip(robots, bodies, strict=True)):
-            if self._field.clearance(self._robot.outline, robot) <= 0.0:
+            if self._space.field.clearance(self._robot.outline, robot) <= 0.0:
                 raise SettingsError(f"options: robots: robot {i} would touch a wall")
             if overlap(body, item):
                 raise SettingsError(f"options: robots: robot {i} would be in the object")
@@ -68,18 +65,10 @@ class Draws:
         SettingsError: there are not so many places.
         """
         outline = se2.transform(pose, self._item.outline)
-        least, found = self._radius + _GAP, np.zeros((0, 3))
-        for _ in range(_GIVE_UP):
-            places = random.uniform(-self._half, self._half, (_TRIES, 2))
-            headings = random.uniform(-math.pi, math.pi, _TRIES)
-            free = ~inside(outline, places) & (distance(outline, places) > least)
-            for place, heading in zip(places[free], headings[free], strict=True):
-                apart = np.hypot(*(found[:, :2] - place).T).min(initial=math.inf)
-                if apart > 2.0 * self._radius + _GAP and self._field.at(*place) > least:
-                    found = np.vstack([found, [*place, heading]])
-                    if len(found) == count:
-                        return found
-        raise SettingsError(f"room: {count} robots do not fit; enlarge it or take fewer")
+        try:
+            return scattered(random, count, self._space, outline, self._radius)
+        except SettingsError as error:
+            raise SettingsError(f"room: {error}") from None
 
 
 def _told(pose: Array) -> str:

@@ -4,6 +4,9 @@ import math
 from dataclasses import field
 from typing import Literal
 
+import numpy as np
+
+from push_model.arrays import Array
 from push_model.kinematics import DifferentialDrive
 from push_model.settings import bounded, settings
 
@@ -58,6 +61,15 @@ class HolonomicDrive:
     max_speed: float = bounded(low=1e-3, high=100.0, doc="Greatest speed in any direction (m/s)")
     max_turn_rate: float = bounded(low=1e-2, high=1000.0, doc="Greatest turn rate (rad/s)")
     max_force: float = bounded(low=1e-3, high=10000.0, doc="Greatest traction (N)")
+
+    def saturate_all(self, twists: Array) -> Array:
+        """The same of many twists ``(…, 3)`` [m/s, m/s, rad/s]."""
+        need = np.maximum(
+            np.hypot(twists[..., 0], twists[..., 1]) / self.max_speed,
+            np.abs(twists[..., 2]) / self.max_turn_rate,
+        )
+        scaled: Array = twists / np.maximum(need, 1.0)[..., None]
+        return scaled
 
     def saturate(self, vx: float, vy: float, omega: float) -> tuple[float, float, float]:
         """The feasible twist of the same direction and rotation centre: scaled by one factor."""

@@ -2,11 +2,14 @@
 
 import math
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from push_model.arrays import Array
 from push_model.se2 import wrap
+
+Number = TypeVar("Number", float, Array)
 
 
 @dataclass(frozen=True)
@@ -39,12 +42,19 @@ class DifferentialDrive:
             (v + omega * self.half_track) / self.wheel_radius,
         )
 
-    def twist(self, left: float, right: float) -> tuple[float, float]:
-        """(v, omega) for wheel speeds [rad/s]."""
+    def twist(self, left: Number, right: Number) -> tuple[Number, Number]:
+        """(v, omega) for wheel speeds [rad/s], numbers or arrays."""
         return (
             (left + right) * self.wheel_radius / 2.0,
             (right - left) * self.wheel_radius / (2.0 * self.half_track),
         )
+
+    def saturate_all(self, twists: Array) -> Array:
+        """The same of many twists ``(…, 3)`` [m/s, m/s, rad/s]; the second column becomes 0."""
+        v, omega = twists[..., 0], twists[..., 2]
+        need = (np.abs(v) + np.abs(omega) * self.half_track) / self.max_speed
+        need = np.maximum(need, 1.0)
+        return np.stack([v / need, np.zeros_like(v), omega / need], axis=-1)
 
     def saturate(self, v: float, omega: float) -> tuple[float, float]:
         """The nearest feasible twist of the same curvature: both scaled by one factor."""

@@ -1,7 +1,7 @@
 """Many planar worlds at once: the same bodies in each, in states of their own.
 
-Each world moves as a ``PlanarWorld`` does, to the bit, whatever the others do; what is saved is the
-way through Python, once a call instead of once a world.
+Each world moves as a ``PlanarWorld`` with the same target twists does, to the bit, whatever the
+others do; what is saved is the way through Python, once a call instead of once a world.
 """
 
 import math
@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from push_model.arrays import Array, Mask, Rows
-from push_model.drives import HolonomicDrive, SpeedDrive
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
 from sim_bridge.planar.batch import advance_all, of_world, stacked
 from sim_bridge.planar.tables import grown, make_contacts, make_sums, make_tables
@@ -94,17 +93,8 @@ class PlanarBatch:
         """
         if not np.isfinite(twists).all():
             raise ValueError("commands are not finite")
-        drive, target = self._drive, self._bodies.target[:, : self._robots]
-        if isinstance(drive, HolonomicDrive):
-            need = np.maximum(
-                np.hypot(twists[..., 0], twists[..., 1]) / drive.max_speed,
-                np.abs(twists[..., 2]) / drive.max_turn_rate,
-            )
-            target[:] = twists / np.maximum(need, 1.0)[..., None]
-        elif isinstance(drive, SpeedDrive):
-            turn = np.abs(twists[..., 2]) * drive.half_track
-            need = np.maximum((np.abs(twists[..., 0]) + turn) / drive.max_speed, 1.0)
-            target[..., 0], target[..., 2] = twists[..., 0] / need, twists[..., 2] / need
+        if self._drive is not None:
+            self._bodies.target[:, : self._robots] = self._drive.saturate_all(twists)
 
     def step(self, steps: int = 1, still: Mask | None = None) -> None:
         """Advance by physics steps; worlds of the mask ``(count,)`` stand still."""

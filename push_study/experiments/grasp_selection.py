@@ -22,11 +22,11 @@ from push_model.occupancy import rasterise
 from push_model.settings import SettingsError
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
 from push_scenario.bodies import load_object, load_robot
+from push_scenario.scatter import scattered
 from push_study import given_grasp, synchronised
 from push_study.given_grasp import task_along
 from push_study.pool import Row
 from push_study.push_record import PushRecord
-from push_study.rooms import scattered
 from push_study.statistics import sign_test
 from push_study.study import StudyOptions
 from push_study.summary import by_cell

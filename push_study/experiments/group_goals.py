@@ -24,9 +24,9 @@ from push_model.settings import SettingsError, from_mapping
 from push_model.specs import EnvironmentSpec, ObjectSpec
 from push_scenario.bodies import load_object, load_robot
 from push_scenario.events import Kill
+from push_scenario.scatter import scattered
 from push_study.graph_run import LockstepRun
 from push_study.pool import Row
-from push_study.rooms import scattered
 from push_study.study import StudyOptions
 from push_study.summary import by_cell
 from push_study.team_run import made_scenario, run_team

@@ -14,9 +14,9 @@ import numpy as np
 from push_model.settings import SettingsError
 from push_model.specs import EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
+from push_scenario.scatter import around
 from push_scenario.scenario import Scenario
 from push_study.pool import Row
-from push_study.rooms import around
 from push_study.study import StudyOptions
 from push_study.summary import by_cell
 from push_study.swarm.targets import positions

@@ -24,9 +24,9 @@ from push_model.jobs import JobError
 from push_model.specs import EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
 from push_scenario.events import Kill
+from push_scenario.scatter import around
 from push_study.graph_run import LockstepRun
 from push_study.pool import Row
-from push_study.rooms import around
 from push_study.study import StudyOptions
 from push_study.swarm.targets import EXPERIMENT, REACHED, ROBOT, length, positions
 from push_study.team_run import made_scenario, run_team

@@ -15,11 +15,11 @@ from push_model.arrays import Array
 from push_model.settings import SettingsError
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
 from push_scenario.bodies import load_object, load_robot
+from push_scenario.scatter import around
 from push_scenario.scenario import load_scenario
 from push_study.experiments.group_goals import GoalTask
 from push_study.experiments.group_goals import problem as group_problem
 from push_study.leaderboard.entries import PLATES, POSES, POSITIONS
-from push_study.rooms import around
 
 
 @dataclass(frozen=True)

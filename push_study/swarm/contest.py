@@ -11,8 +11,8 @@ from push_model.free_space import FreeSpace
 from push_model.occupancy import rasterise
 from push_model.specs import EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
+from push_scenario.scatter import scattered
 from push_study.pool import Row
-from push_study.rooms import scattered
 from push_study.swarm.targets import ROBOT, keep_ways, positions
 from push_study.team_run import made_scenario, run_team
 from push_study.uncertainty import uncertainty

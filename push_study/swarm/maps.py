@@ -14,8 +14,8 @@ from push_model.settings import from_mapping
 from push_model.specs import EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
 from push_scenario.files import find, read_yaml
+from push_scenario.scatter import scattered
 from push_study.pool import Row
-from push_study.rooms import scattered
 from push_study.swarm.targets import ROBOT, keep_ways, phase_times
 from push_study.team_run import made_scenario, run_team
 from push_study.uncertainty import uncertainty

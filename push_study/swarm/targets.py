@@ -14,9 +14,9 @@ from push_model import se2
 from push_model.arrays import Array
 from push_model.specs import EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
+from push_scenario.scatter import around
 from push_scenario.scenario import Scenario
 from push_study.pool import Row
-from push_study.rooms import around
 from push_study.team_run import Outcome, made_scenario, run_team
 from push_study.uncertainty import uncertainty
 

@@ -15,8 +15,8 @@ from push_model.occupancy import rasterise
 from push_model.settings import from_mapping
 from push_model.specs import EnvironmentSpec, ObjectSpec
 from push_scenario.bodies import load_object, load_robot
+from push_scenario.scatter import scattered
 from push_study.experiments.group_goals import plate
-from push_study.rooms import scattered
 from push_study.uncertainty import uncertainty
 from tests.driving import GroupWorld, answer
 

@@ -13,6 +13,7 @@ from push_model import (
     rotation,
     unicycle_step,
 )
+from push_scenario.bodies import load_robot
 
 DRIVE = DifferentialDrive(0.0205, 0.0265, 6.28)
 
@@ -116,3 +117,17 @@ def test_concatenated_heading_is_continuous():
     assert np.abs(np.diff(t.pose[:, 2])).max() < 0.2
     pose, twist = t.sample(np.array([-1.0, t.duration + 1.0]))
     assert pose[1] == pytest.approx(t.pose[-1]) and not twist.any()
+
+
+def test_many_twists_are_limited_like_one():
+    random = np.random.default_rng(1)
+    twists = random.uniform(-1.0, 1.0, (50, 4, 3)) * [0.5, 0.5, 20.0]
+    for name in ("epuck", "disc"):
+        drive = load_robot(name).drive
+        found = drive.saturate_all(twists)
+        for told, limited in zip(twists.reshape(-1, 3), found.reshape(-1, 3), strict=True):
+            if name == "disc":  # the square roots of math and numpy may differ in the last bit
+                assert limited == pytest.approx(drive.saturate(*told.tolist()), rel=1e-14)
+            else:
+                v, omega = drive.saturate(told[0], told[2])
+                assert limited.tolist() == [v, 0.0, omega]

@@ -13,7 +13,7 @@ from push_model.specs import EnvironmentSpec
 from push_msgs.action import SwarmMove
 from push_ros.validation import InvalidMessage
 from push_scenario.bodies import load_object, load_robot
-from push_study.rooms import around as starts
+from push_scenario.scatter import around as starts
 from push_study.uncertainty import uncertainty
 from swarm_push.crescent_law import CrescentLawSettings
 from swarm_push.laws import LawSections, LawSettings

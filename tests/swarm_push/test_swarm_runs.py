@@ -15,7 +15,7 @@ from push_model.occupancy import rasterise
 from push_model.shape_specs import PolygonShape
 from push_model.specs import EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
-from push_study.rooms import around as starts
+from push_scenario.scatter import around as starts
 from push_study.uncertainty import uncertainty
 from swarm_push.region import covered_region
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
