@@ -31,10 +31,15 @@ def guarded(trial: Trial, task: Any) -> Row:
 
 
 def crashed(task: Any, reason: str) -> Row:
-    """The row of a trial that has no end of its own; it is run again when a study goes on."""
+    """The row of a trial that has no end of its own; it is run again when a study goes on.
+
+    It says what was tried: scenario, seed and, where methods are compared, the method.
+    """
+    method = {"method": task.method} if hasattr(task, "method") else {}
     return {
         "scenario": getattr(task, "scenario", ""),
         "seed": getattr(task, "seed", None),
+        **method,
         "success": False,
         "reason": reason,
         "crashed": True,

@@ -10,7 +10,7 @@ from push_study.leaderboard.entries import entries, entry_of
 from push_study.leaderboard.match import Match, play
 from push_study.leaderboard.page import write
 from push_study.leaderboard.standings import Cell, cells
-from push_study.pool import Row, crashed
+from push_study.pool import Row
 from push_study.study import StudyOptions
 
 SCENARIOS = tuple(CONTESTS)
@@ -46,12 +46,8 @@ def tasks(options: StudyOptions) -> list[Match]:
 
 
 def trial(task: Match) -> Row:
-    """One match; what goes wrong in it is the method's, and counts."""
-    try:
-        return play(task)
-    except Exception as error:
-        row = crashed(task, f"{type(error).__name__}: {error}")
-        return row | {"method": entry_of(task.method).name, "entry": task.method}
+    """One match."""
+    return play(task)
 
 
 def statistics(rows: list[Row]) -> dict[str, Any]:
@@ -90,7 +86,7 @@ def conclude(options: StudyOptions, tasks: Sequence[Match], rows: list[Row]) -> 
 
 
 def _standings(rows: list[Row]) -> list[Cell]:
-    who = [entry_of(name) for name in dict.fromkeys(r["entry"] for r in rows if "entry" in r)]
+    who = {name: entry_of(name) for name in dict.fromkeys(r["method"] for r in rows)}
     return cells(rows, who, [n for n in CONTESTS if any(r["scenario"] == n for r in rows)])
 
 

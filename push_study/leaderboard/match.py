@@ -55,8 +55,7 @@ def play(match: Match) -> Row:
     row: Row = {
         "scenario": match.scenario,
         "seed": match.seed,
-        "method": entry.name,
-        "entry": match.method,
+        "method": match.method,
         "success": bool(outcome.success and near),
         **outcome.row(),
         "cpu_s": spent,

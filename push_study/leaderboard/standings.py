@@ -7,7 +7,7 @@ these overlap, when its interval of Lambda lies below.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,17 +39,20 @@ class Cell:
     leads: tuple[str, ...] = ()
 
 
-def cells(rows: Sequence[Row], entries: Sequence[Entry], contests: Sequence[str]) -> list[Cell]:
-    """Of all rows, with ranks; contests in their order, methods by rank in what they are told."""
+def cells(rows: Sequence[Row], entries: Mapping[str, Entry], contests: Sequence[str]) -> list[Cell]:
+    """Of all rows, with ranks; contests in their order, methods by rank in what they are told.
+
+    entries: by the methods of the rows.
+    """
     found = []
     for name in contests:
-        here = [_cell(name, e, rows) for e in entries]
+        here = [_cell(name, k, e, rows) for k, e in entries.items()]
         found += _ranked([c for c in here if c is not None])
     return found
 
 
-def _cell(contest: str, entry: Entry, rows: Sequence[Row]) -> Cell | None:
-    mine = [r for r in rows if (r["scenario"], r.get("method")) == (contest, entry.name)]
+def _cell(contest: str, method: str, entry: Entry, rows: Sequence[Row]) -> Cell | None:
+    mine = [r for r in rows if (r["scenario"], r["method"]) == (contest, method)]
     if not mine:
         return None
     good = [r for r in mine if r["success"]]
