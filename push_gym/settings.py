@@ -44,13 +44,13 @@ class EnvSettings:
         60.0, low=0.1, high=1e5, doc="Simulated time after which an episode is truncated (s)."
     )
     position_tolerance: float = bounded(
-        0.02, low=1e-4, high=10.0, doc="Distance from the goal within which it counts (m)."
+        0.02, low=1e-4, high=10.0, doc="Distance at which the goal counts as reached (m)."
     )
     orientation_tolerance: float | None = bounded(
         0.1,
         low=1e-3,
         high=3.15,
-        doc="Angle from the goal within which it counts (rad); none: headings do not matter.",
+        doc="Heading error at which the goal counts as reached (rad); none: any heading.",
     )
 
     @property

@@ -24,11 +24,16 @@ from push_model.settings import bounded, settings
 
 @settings
 class PointPushSettings:
-    """Lengths are in radii of the disc."""
+    """Lengths, and costs, which are lengths, are in radii of the disc."""
 
-    spacing: float = bounded(0.4, low=0.05, high=5.0, doc="Distance between places of pushes (-).")
+    spacing: float = bounded(
+        0.4, low=0.05, high=5.0, doc="Distance between places of pushes (radii)."
+    )
     start_gap: float = bounded(
-        0.2, low=0.01, high=2.0, doc="Distance of the disc from the object when a push starts (-)."
+        0.2,
+        low=0.01,
+        high=2.0,
+        doc="Distance of the disc from the object when a push starts (radii).",
     )
     directions: tuple[float, ...] = bounded(
         (-0.6, -0.25, 0.0, 0.25, 0.6),
@@ -37,7 +42,10 @@ class PointPushSettings:
         doc="Angles of planned pushes from the normal of the outline (rad).",
     )
     lengths: tuple[float, ...] = bounded(
-        (0.07, 0.2, 0.47, 0.93, 1.87, 3.3, 5.3), low=0.01, high=100.0, doc="Lengths of pushes (-)."
+        (0.07, 0.2, 0.47, 0.93, 1.87, 3.3, 5.3),
+        low=0.01,
+        high=100.0,
+        doc="Lengths of pushes (radii).",
     )
     fan: tuple[float, ...] = bounded(
         (-0.8, -0.4, -0.2, 0.0, 0.2, 0.4, 0.8),
@@ -49,19 +57,22 @@ class PointPushSettings:
         (0.04, 0.08, 0.13, 0.27, 0.47, 0.73, 1.07, 1.6, 2.4, 3.7, 5.3),
         low=0.01,
         high=100.0,
-        doc="Distances of these targets behind the point of contact (-).",
+        doc="Distances of these targets behind the point of contact (radii).",
     )
     followed: int = bounded(24, low=1, high=1000, doc="First pushes that are looked at closely.")
     near: float = bounded(
-        0.4, low=0.0, high=100.0, doc="Cost below which no second push is looked for (-)."
+        0.4, low=0.0, high=100.0, doc="Cost below which no second push is looked for (radii)."
     )
     way_cost: float = bounded(
-        0.012, low=0.0, high=1.0, doc="Cost of the disc's way to a push, of its length (-)."
+        0.012,
+        low=0.0,
+        high=1.0,
+        doc="Cost of the disc's way to a push, as a fraction of its length (dimensionless).",
     )
     horizon: int = bounded(70, low=1, high=1000, doc="Steps of a push that is planned.")
     control_horizon: int = bounded(50, low=1, high=1000, doc="Steps of a push under control.")
     least_gain: float = bounded(
-        0.017, low=0.0, high=10.0, doc="Progress of the object without which a push ends (-)."
+        0.017, low=0.0, high=10.0, doc="Progress of the object without which a push ends (radii)."
     )
 
 
