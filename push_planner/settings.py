@@ -159,7 +159,7 @@ class PlannerSettings:
         "wheel_reserve may require a lower one",
     )
     push_acceleration: float = bounded(
-        0.2,
+        0.3,
         low=0.005,
         high=5.0,
         doc="Acceleration of the robot at the beginning and at the end of a push (m/s^2)",
@@ -175,7 +175,7 @@ class PlannerSettings:
         0.125, low=0.005, high=2.0, doc="Greatest speed of the robot between two pushes (m/s)"
     )
     move_acceleration: float = bounded(
-        0.3, low=0.005, high=5.0, doc="Acceleration of the robot between two pushes (m/s^2)"
+        0.5, low=0.005, high=5.0, doc="Acceleration of the robot between two pushes (m/s^2)"
     )
     turn_rate: float = bounded(
         4.0,
