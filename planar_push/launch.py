@@ -70,6 +70,8 @@ def _what_next(setup: "SuiteSetup") -> str:
         spaces = [n.namespace for n in setup.nodes if n.kind == "torque_controller"]
         return "send trajectories to: " + ", ".join(f"{s}/follow_trajectory" for s in spaces)
     words = f" --namespace {setup.namespace}" if setup.namespace else ""
+    if any(node.kind == "rearranger" for node in setup.nodes):
+        return f"bring all objects to their places with: planar-push rearrange{words}"
     team = teams_of(setup.scenario)[0].name
     words += f" --team {team}" if team else ""
     return f"send a goal with: planar-push goal X Y THETA{words}"

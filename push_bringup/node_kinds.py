@@ -30,6 +30,7 @@ from push_mpc.torque_observer import TorqueObserverSettings
 from push_mpc.torque_tracker import TorqueTrackerSettings
 from push_mpc.wheel_slip_nmpc import WheelSlipSettings
 from push_planner import PlannerSettings
+from push_planner.rearrangement import RearrangementSettings
 from push_ros.estimator_node import EstimatorSettings
 from push_ros.outline_node import OutlineNodeSettings
 from push_ros.roster import RosterSettings
@@ -181,6 +182,14 @@ KINDS: dict[str, NodeKind] = {
         lambda s: {"namespace": s.namespace, "world": s.world},
         ("world",),
         {"": PlannerSettings},
+    ),
+    "rearranger": NodeKind(
+        "push_planner.rearranger_node",
+        "RearrangerNode",
+        lambda s: {"robot": s.robot, "namespace": s.namespace, "world": s.world},
+        ("world", "robot"),
+        {"": RearrangementSettings, **_GATED},
+        listens=1,
     ),
     "controller": NodeKind(
         "push_mpc.node",

@@ -93,6 +93,24 @@ def single(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
     return tuple(nodes)
 
 
+def rearrange(scenario: Scenario, namespace: str = "") -> tuple[NodeSpec, ...]:
+    """Nodes of the system ``rearrange``: those of ``single``, and one that decides which object the
+    robot pushes next.
+
+    Raises
+    ------
+    SettingsError: see ``single``; or the scenario has teams.
+    """
+    if scenario.teams:
+        raise SettingsError(
+            f"scenario '{scenario.name}' has teams; in the system 'rearrange' one robot pushes all "
+            "objects, so remove 'teams'"
+        )
+    nodes = single(scenario, namespace)
+    owner = next(n for n in nodes if n.kind == "supervisor")
+    return (*nodes, replace(owner, name="rearranger", kind="rearranger", item=""))
+
+
 def _estimates(scenario: Scenario, kind: str = "estimator") -> bool:
     """Whether the scenario asks for estimators of a kind."""
     return bool(scenario.parameters.get(kind, {}).get("enabled", False))
@@ -258,6 +276,7 @@ class System:
 
 SYSTEMS: dict[str, System] = {
     "single": System(single, "env1-target1"),
+    "rearrange": System(rearrange, "rearrange"),
     "torque": System(torque, "wheel-slip"),
     "group": System(group, GROUP.example),
     "swarm": System(swarm, SWARM.example),

@@ -14,6 +14,16 @@ class TooHeavy(Exception):
     """The robot cannot push the object; the text says what it needs and what there is."""
 
 
+def planner_among(planner: PushPlanner, start: Array, circles: Array) -> PushPlanner:
+    """A planner on the map with other bodies on it, see ``with_bodies``."""
+    if not len(circles):
+        return planner
+    scene, settings = planner.scene, planner.settings
+    margin = settings.safety_distance
+    grid = with_bodies(scene.field.grid, circles, scene.item.outline, start, margin)
+    return PushPlanner(settings, grid, scene.robot, scene.item, scene.believed)
+
+
 def plan_among_bodies(
     planner: PushPlanner,
     start: Array,
@@ -41,10 +51,7 @@ def plan_among_bodies(
     problem = too_heavy(scene.robot, scene.item)
     if problem is not None:
         raise TooHeavy(problem)
-    if len(circles):
-        margin = settings.safety_distance
-        grid = with_bodies(scene.field.grid, circles, scene.item.outline, start, margin)
-        planner = PushPlanner(settings, grid, scene.robot, scene.item, scene.believed)
+    planner = planner_among(planner, start, circles)
     if preemptive:
         return plan_after_preemptive_push(planner, start, goal, settings.seed + preemptive, robot)
     return planner.plan(start, goal, robot=robot)

@@ -129,6 +129,8 @@ class _Seen:
         self._calls = {names.world(CALLS), *(n.team(CALLS) for n in teams.values())}
         self._goals = {n.team("goal_pose"): team for team, n in teams.items()}
         self._states = {n.team("job_state"): team for team, n in teams.items()}
+        known = {**scenario.teams, "": scenario.team()} if "" in teams else scenario.teams
+        self._objects = {team: known[team].object for team in teams}
         self._store = typestore()
         self.ticks = 0
         self.start = self.end = 0.0
@@ -199,6 +201,11 @@ class _Seen:
         message = self._message(record)
         self.system = self.system or str(message.system)
         job, before = int(message.job), self._jobs.get(team, 0)
+        if job > before and str(message.object) != self._objects[team]:
+            raise CannotRerun(
+                f"a job of the bag is about '{message.object}', which was named in an action; only "
+                "goals of the first object of a team can be repeated"
+            )
         refused = int(message.refusals) > self._refusals.get(team, 0)
         self._refusals[team] = int(message.refusals)
         if job > before:

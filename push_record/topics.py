@@ -69,6 +69,8 @@ WORLD = {
 
 TEAM = {
     "goal_pose": Topic(PoseStamped, COMMAND),
+    "goal_poses": Topic(Poses, COMMAND),
+    "rearrangement": Topic(JobState, LATCHED),
     "push_plan": Topic(PushPlan, LATCHED),
     "push_path": Topic(PathMessage, LATCHED),
     "group_plan": Topic(GroupPlan, LATCHED),
@@ -78,6 +80,9 @@ TEAM = {
     CALLS: Topic(ServiceCall, STATUS),
 }
 """In the namespace of each team."""
+
+GOALS = ("goal_pose", "goal_poses")
+"""Those on which people send goals; a playback does not publish them."""
 
 ROBOT = {
     "cmd_vel": Topic(TwistStamped, COMMAND),
@@ -129,7 +134,7 @@ def shown_topics(scenario: Scenario, namespace: str = "") -> dict[str, Topic]:
     names = next(iter(teams.values()))
     topics = {names.world(t): WORLD[t] for t in SHOWN}
     for team in teams.values():
-        topics.update({team.team(t): topic for t, topic in TEAM.items() if t != "goal_pose"})
+        topics.update({team.team(t): topic for t, topic in TEAM.items() if t not in GOALS})
     for robot in scenario.robots if len(scenario.robots) < MANY else ():
         for own in ("controller/status", "report"):
             topics[names.robot(robot, own)] = ROBOT[own]

@@ -6,7 +6,7 @@ nothing. Any other one replaces the job under way.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -72,10 +72,28 @@ class JobOwner(Protocol):
         ...
 
 
+class ObjectChoice(Protocol):
+    """An owner whose jobs may be about other objects than its own."""
+
+    @property
+    def names_of_objects(self) -> Collection[str]:
+        """All objects, also its own."""
+        ...
+
+    def check_other(self, item: str, goal: Array) -> None:
+        """Raise GoalRefused unless a goal ``(3,)`` of another object could be worked on."""
+        ...
+
+    def use(self, item: str) -> None:
+        """Work on this object from now on; no job is under way."""
+        ...
+
+
 class JobIntake:
     """Owns ``goal_pose``, ``move_object``, ``execute``, ``cancel``, ``job_state``, ``status_text``.
 
-    system: single, group or swarm; robots, item: whose job it is.
+    system: single, group or swarm; robots, item: whose job it is. Goals on ``goal_pose`` are of the
+    item; a goal of ``move_object`` may name another object, where the owner has a choice.
     """
 
     def __init__(
@@ -89,19 +107,22 @@ class JobIntake:
         item: str,
         consider: Consider | None = None,
         memory: JobMemory | None = None,
+        choice: ObjectChoice | None = None,
     ) -> None:
         """consider: in the place of the owner's ``check_goal``, where that takes time: answers, now
         or later, with why a goal ``(3,)`` is refused, with None where it can be worked on.
-        memory: of jobs; that of the process if it is not given."""
-        self._keeper = JobKeeper(memory or JobMemory.of_process(), (item, *robots))
+        memory: of jobs; that of the process if it is not given. choice: of other objects."""
+        others = () if choice is None else choice.names_of_objects
+        self._keeper = JobKeeper(memory or JobMemory.of_process(), (item, *robots), others)
         self._run, self._since = "", math.nan
         self._stamp = 0.0  # [s] of the last frame
         self._consider = consider or self._check
         self._node, self._owner, self._diagnostics = node, owner, diagnostics
-        self._item = item
+        self._item, self._choice = item, choice
         self._goal: Array | None = None  # of the job under way, or of the last one
         self._state = JobState(system=system, robots=list(robots), object=item)
         if (kept := self._keeper.pending) is not None:
+            self._use(self._keeper.item)
             self._state.job = kept.job
             self._state.goal = deserialize_message(bytes.fromhex(kept.goal), PoseStamped)
         self._state_publisher = node.create_publisher(JobState, names.team("job_state"), LATCHED)
@@ -113,8 +134,10 @@ class JobIntake:
             names.team("move_object"),
             check=lambda request: None,
             consider=self._consider_request,
-            preempt=lambda request: self._make_way(request.goal),
-            start=lambda request: self._take(request.goal, bool(request.plan_only)),
+            preempt=lambda request: self._make_way(request.object or item, request.goal),
+            start=lambda request: self._take(
+                request.object or item, request.goal, bool(request.plan_only)
+            ),
             cancel=lambda: self._owner.end_job(JobError.CANCELED, "canceled"),
         )
         node.create_subscription(String, names.world("world_run"), self._on_run, LATCHED)
@@ -237,7 +260,14 @@ class JobIntake:
     def _on_run(self, message: String) -> None:
         self._run = str(message.data)
 
-    def _judge(self, message: PoseStamped, topic: str, answer: Answer) -> None:
+    def _use(self, item: str) -> None:
+        """The next job is about this object."""
+        if item != self._state.object and self._choice is not None:
+            self._choice.use(item)
+            self._keeper.use(item)
+            self._state.object = item
+
+    def _judge(self, message: PoseStamped, topic: str, answer: Answer, item: str = "") -> None:
         """Answer, now or later, with why a goal is refused, with None where it can be taken."""
         try:
             goal = stamped_pose(message, "the goal")
@@ -247,19 +277,25 @@ class JobIntake:
             code = JobError.UNKNOWN_FRAME if frame else JobError.INVALID_GOAL
             answer(GoalRefused(code, str(error)))
         else:
-            self._consider(goal, answer)
+            if self._choice is None or (item or self._item) == self._state.object:
+                self._consider(goal, answer)
+            else:
+                self._check(goal, answer, item or self._item)
 
-    def _check(self, goal: Array, answer: Answer) -> None:
+    def _check(self, goal: Array, answer: Answer, item: str = "") -> None:
         refusal = None
         try:
-            self._owner.check_goal(goal)
+            if item and self._choice is not None:
+                self._choice.check_other(item, goal)
+            else:
+                self._owner.check_goal(goal)
         except GoalRefused as error:
             refusal = error
         answer(refusal)
 
-    def _pursued(self, goal: Array) -> bool:
+    def _pursued(self, item: str, goal: Array) -> bool:
         """Whether the job under way has this goal."""
-        if self._goal is None or not self._owner.busy:
+        if self._goal is None or not self._owner.busy or item != self._state.object:
             return False
         gap = goal - self._goal
         return bool(np.hypot(gap[0], gap[1]) < _SAME and abs(se2.wrap(float(gap[2]))) < _SAME)
@@ -269,8 +305,8 @@ class JobIntake:
             if refusal is not None:
                 self._say_no(message, refusal)
                 return
-            self._make_way(message)
-            self._take(message, False)
+            self._make_way(self._item, message)
+            self._take(self._item, message, False)
 
         self._judge(message, self._goal_topic, judged)
 
@@ -284,15 +320,16 @@ class JobIntake:
             self._say_no(request.goal, refusal)
             answer(MoveObject.Result(error_code=int(refusal.code), error_msg=str(refusal)))
 
-        if request.object not in ("", self._item):
+        others = () if self._choice is None else self._choice.names_of_objects
+        if request.object not in ("", self._item, *others):
             text = f"unknown object '{request.object}'"
             judged(GoalRefused(JobError.UNKNOWN_OBJECT, text))
             return
-        self._judge(request.goal, "move_object", judged)
+        self._judge(request.goal, "move_object", judged, request.object)
 
-    def _make_way(self, message: PoseStamped) -> None:
+    def _make_way(self, item: str, message: PoseStamped) -> None:
         """End what is under way, unless it is the same."""
-        same = self._pursued(stamped_pose(message, "the goal"))
+        same = self._pursued(item, stamped_pose(message, "the goal"))
         why = "a new goal replaces this one"
         if same:  # whoever waited for it waits no longer; the job goes on
             code = int(JobError.PREEMPTED)
@@ -304,12 +341,13 @@ class JobIntake:
         elif self._owner.busy or self._owner.plan_ready:
             self._owner.end_job(JobError.PREEMPTED, why)
 
-    def _take(self, message: PoseStamped, plan_only: bool) -> None:
+    def _take(self, item: str, message: PoseStamped, plan_only: bool) -> None:
         goal = stamped_pose(message, "the goal")
         self._state.goal = message
-        if self._pursued(goal):
+        if self._pursued(item, goal):
             self._state_publisher.publish(self._state)
             return
+        self._use(item)
         self._goal = goal
         self._state.job += 1
         kept = bytes(serialize_message(message))

@@ -7,7 +7,7 @@ is away, the robots do not move, because they receive no commands.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -36,16 +36,29 @@ class JobKeeper:
     pending: the job of the node that died, as long as the restarted node has not continued it.
     """
 
-    def __init__(self, memory: JobMemory, team: tuple[str, ...]) -> None:
-        """team: object, then robots."""
+    def __init__(
+        self, memory: JobMemory, team: tuple[str, ...], further: Collection[str] = ()
+    ) -> None:
+        """team: object, then robots. further: objects that a job may be about instead."""
         self._memory, self._team = memory, team
         self._current: KeptJob | None = None
         self._seen: tuple[float, str, Bodies] = (-math.inf, "", dict)
         self.pending: KeptJob | None = None
         kept = memory.read()
-        if kept is not None and kept.team == team:
+        items = (team[0], *further)
+        if kept is not None and kept.team[1:] == team[1:] and kept.team[0] in items:
+            self._team = kept.team
             self.pending = replace(kept, restarts=kept.restarts + 1)
         memory.write(self.pending)
+
+    @property
+    def item(self) -> str:
+        """The object of the job."""
+        return self._team[0]
+
+    def use(self, item: str) -> None:
+        """The next job is about this object."""
+        self._team = (item, *self._team[1:])
 
     def begin(
         self,

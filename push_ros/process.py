@@ -39,15 +39,20 @@ def die_with_parent() -> None:
     ctypes.CDLL(None).prctl(1, signal.SIGTERM)
 
 
-def heard(node: Node, publisher: Any, state_type: str = "push_msgs/msg/JobState") -> bool:
+def heard(
+    node: Node,
+    publisher: Any,
+    state_type: str = "push_msgs/msg/JobState",
+    state: str = "job_state",
+) -> bool:
     """Whether what a publisher of the node sends now is heard by who owns the job.
 
     A count of subscriptions is not enough, it may be the recorder's: one of them must belong to a
-    node that publishes the state of a job.
+    node that publishes the state of a job, on a topic beside that of the publisher.
     """
     known = node.get_subscriptions_info_by_topic(publisher.topic_name)
     listeners = {(info.node_namespace, info.node_name) for info in known}
-    topic = publisher.topic_name.rsplit("/", 1)[0] + "/job_state"
+    topic = publisher.topic_name.rsplit("/", 1)[0] + f"/{state}"
     owners = {
         (info.node_namespace, info.node_name)
         for info in node.get_publishers_info_by_topic(topic)

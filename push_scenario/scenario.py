@@ -28,9 +28,9 @@ from push_scenario.files import (
 )
 from push_scenario.lab import LabSettings, check_lab
 from push_scenario.map_file import is_map, load_map, map_to_mapping
-from push_scenario.poses import PoseValue, to_value
+from push_scenario.poses import PoseValue, to_array, to_value
 from push_scenario.room import Room
-from push_scenario.start_check import aim_troubles, start_troubles
+from push_scenario.start_check import aim_troubles, arrangement_troubles, start_troubles
 from push_scenario.teams import (
     Team,
     TeamEntry,
@@ -64,6 +64,7 @@ class ScenarioFile:
     goal: PoseValue | None = bounded(None, doc="Goal [x, y, theta] [m, m, rad] of the first object")
     goals: tuple[PoseValue, ...] = bounded((), doc="Several goals, reached one after another")
     trajectory: tuple[TimedPose, ...] = bounded((), doc="Timed poses instead of goals")
+    arrangement: dict[str, PoseValue] = field(default_factory=dict)
     teams: dict[str, TeamEntry] = field(default_factory=dict)
     events: tuple[Event, ...] = bounded((), doc="Events while the scenario runs")
     parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
@@ -91,6 +92,7 @@ class Scenario:
     robots, objects: name to type and start pose ``(3,)``.
     parameters: node name to a mapping of that node's settings.
     goals: poses ``(3,)`` one after another, of a scenario without teams; or trajectory.
+    arrangement: goal ``(3,)`` of each object by name, for one robot that moves all of them.
     teams: by name; empty when all robots are one team. events: in the order of time.
     on: "sim" or "lab". lab: drivers of the lab, None where the file has none.
     """
@@ -102,6 +104,7 @@ class Scenario:
     parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
     goals: tuple[Array, ...] = ()
     trajectory: tuple[TimedPose, ...] = ()
+    arrangement: dict[str, Array] = field(default_factory=dict)
     teams: dict[str, Team] = field(default_factory=dict)
     events: tuple[Event, ...] = ()
     on: str = "sim"
@@ -133,6 +136,8 @@ class Scenario:
             }
         else:
             values.update(aims_to_mapping(self.goals, self.trajectory))
+        if self.arrangement:
+            values["arrangement"] = {n: to_value(pose) for n, pose in self.arrangement.items()}
         values["events"] = [asdict(e) for e in self.events]
         values["parameters"] = self.parameters
         if self.lab is not None:
@@ -216,6 +221,7 @@ class Scenario:
         teams: Iterable[Team] = self.teams.values() or (self.team(),)
         found = start_troubles(self.robots, self.objects, room)
         found += aim_troubles(teams, self.objects, room)
+        found += arrangement_troubles(self.arrangement, self.objects, room)
         if found:
             raise SettingsError("\n".join(f"{where}: {trouble}" for trouble in found))
 
@@ -266,6 +272,9 @@ def scenario_from_mapping(
     starts = placed(robots, objects, Room(environment))
     groups = {g.key: g.names for g in robots} | {n: (n,) for g in robots for n in g.names}
     names = tuple(n for g in objects for n in g.names)
+    unknown = [n for n in file.arrangement if n not in names]
+    if unknown:
+        raise SettingsError(f"{where}.arrangement: unknown objects {unknown}; known: {list(names)}")
     check_names(file.events, {n for g in robots for n in g.names}, set(names), f"{where}.events")
     scenario = Scenario(
         name=name,
@@ -275,6 +284,7 @@ def scenario_from_mapping(
         parameters=_copied(file.parameters),
         goals=goals_of(file.goal, file.goals),
         trajectory=file.trajectory,
+        arrangement={n: to_array(pose) for n, pose in file.arrangement.items()},
         teams=made_teams(file.teams, groups, names, f"{where}.teams"),
         events=tuple(sorted(file.events, key=lambda e: e.at)),
         on=file.on,

@@ -1,6 +1,6 @@
 """Check start poses and goals: not in a wall, not in another body, not outside the arena."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -45,6 +45,18 @@ def aim_troubles(teams: Iterable[Team], objects: Objects, room: Room) -> list[st
             if trouble is not None:
                 what = f"object '{team.object}' at the {which}" if team.object else f"the {which}"
                 found.append(f"{what}{of_team} is {trouble}, at {_at(body)}")
+    return found
+
+
+def arrangement_troubles(
+    arrangement: Mapping[str, Array], objects: Objects, room: Room
+) -> list[str]:
+    """Problems of goals of several objects, one line each."""
+    goals = [object_footprint(n, objects[n][0], pose) for n, pose in arrangement.items()]
+    told = [(goal, room.trouble(goal)) for goal in goals]
+    found = [f"goal of '{g.name}' is {why}, at {_at(g)}" for g, why in told if why is not None]
+    pairs = [(one, two) for one, two in _near(goals) if one.meets(two)]
+    found += [f"goals of '{one.name}' and '{two.name}' overlap" for one, two in pairs]
     return found
 
 

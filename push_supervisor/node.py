@@ -1,10 +1,10 @@
 """The supervisor node: goals in, questions to planner and controller out, the job's state out."""
 
 import sys
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
-import yaml
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from std_msgs.msg import Header, String
@@ -12,11 +12,11 @@ from std_msgs.msg import Header, String
 from push_estimation.pose_gate import PoseGateSettings, Stamp
 from push_model import se2
 from push_model.arrays import Array
-from push_model.jobs import GoalRefused, JobError
+from push_model.jobs import JobError
 from push_model.occupancy import OccupancyGrid as Grid
 from push_model.settings import SettingsError
 from push_msgs.action import MoveObject
-from push_ros.belief_feed import BeliefFeed
+from push_ros.belief_feed import BeliefFeed, belief_of
 from push_ros.diagnostics import Diagnostics
 from push_ros.job_intake import JobIntake
 from push_ros.job_memory import KeptJob
@@ -36,6 +36,7 @@ from push_supervisor.displacement import Displacement
 from push_supervisor.event_queue import EventQueue
 from push_supervisor.events import Event
 from push_supervisor.machine import Machine
+from push_supervisor.objects import Objects
 from push_supervisor.peers import Peers
 from push_supervisor.requests import Moment, Peer, Request, Requests, Step
 from push_supervisor.settings import SupervisorSettings
@@ -45,7 +46,11 @@ _POSE_PERIOD = 0.045  # [s] of the frames that are looked at
 
 
 class SupervisorNode(Node):
-    """One robot, one object, one job at a time."""
+    """One robot, one object at a time, one job at a time.
+
+    Goals on ``goal_pose`` are of the object that the node is made for. A goal of the action may
+    name any other object of the scenario that belongs to no other team.
+    """
 
     def __init__(
         self,
@@ -62,43 +67,38 @@ class SupervisorNode(Node):
         robot = str(self.declare_parameter("robot", robot).value)
         item = str(self.declare_parameter("object", item).value)
         scenario = scenario or load_scenario(str(name))
-        self.robot, robot_spec = scenario.robot(robot)
-        self.object, item_spec = scenario.object(item)
+        self.robot, self.object = scenario.robot(robot)[0], scenario.object(item)[0]
         values = dict(scenario.parameters.get("supervisor", {}))
         poses = {"persistence": 3, **values.pop("poses", {})}
         self.settings = declare_settings(
             self, SupervisorSettings, values, where="supervisor", apply=self._apply
         )
         gate = declare_settings(self, PoseGateSettings, poses, "poses", "supervisor.poses")
-        bodies = scenario.radii
-        others = {k: r for k, r in bodies.items() if k not in (self.robot, self.object)}
-        self.surroundings = Surroundings(robot_spec, item_spec, others, self.settings)
-        self.machine = Machine(self.settings, self._at_goal, self._touching)
+        self._objects = Objects(scenario, self.robot, self.object, lambda: self.settings)
+        self.surroundings = self._objects.around(self.object, belief_of(scenario))
+        self.machine = Machine(self.settings, self._at_goal, lambda: self._touched() is not None)
         self._requests = Requests(self.settings)
         self._ticks = 0
         self._displacement = Displacement(self.machine)
         self._blocked_way = BlockedWay(self.machine)
-        self._world: Any = None  # what the world says that robot and object are
         self._fire = EventQueue(self.machine, self._carry_out, self._publish_state).fire
         self._diagnostics = Diagnostics(self, self.names, self._diagnose)
-        self._poses = PoseFeed(
-            self, self.names, gate, list(bodies), self._diagnostics, self._on_frame, _POSE_PERIOD
-        )
+        bodies, told = list(scenario.radii), self._diagnostics
+        self._poses = PoseFeed(self, self.names, gate, bodies, told, self._on_frame, _POSE_PERIOD)
         self._peers = Peers(
             self, self.names, self.robot, self.object, self._on_answer, self._on_sign
         )
-        self._intake = JobIntake(
-            self, self.names, self._diagnostics, self, "single", [self.robot], self.object
-        )
         self._connect(scenario)
+        job = self, "single", [self.robot], self.object
+        self._intake = JobIntake(self, self.names, self._diagnostics, *job, choice=self)
         self._publish_state()
 
     def _connect(self, scenario: Scenario) -> None:
         names = self.names
-        heartbeat = names.robot(self.robot, "heartbeat")
-        self._heartbeat_publisher = self.create_publisher(Header, heartbeat, STREAM)
+        beat = names.robot(self.robot, "heartbeat")
+        self._heartbeat_publisher = self.create_publisher(Header, beat, STREAM)
         MapFeed(self, names, self._diagnostics, self._take_map)
-        BeliefFeed(
+        self._beliefs = BeliefFeed(
             self,
             names,
             scenario,
@@ -137,11 +137,7 @@ class SupervisorNode(Node):
 
     def check_goal(self, goal: Array) -> None:
         """See JobOwner."""
-        if self._world is not None:
-            for name, body in zip((self.robot, self.object), self._world, strict=True):
-                if body is None:
-                    text = f"no body '{name}' in the world; use a name of the scenario"
-                    raise GoalRefused(JobError.UNKNOWN_OBJECT, text)
+        self._objects.check(self.object)
         self.surroundings.check_goal(goal)
 
     def take_goal(self, goal: Array, plan_only: bool) -> None:
@@ -164,6 +160,28 @@ class SupervisorNode(Node):
         """The process ends in good order."""
         self._intake.forget()
 
+    # Goals of other objects, see ObjectChoice
+
+    @property
+    def names_of_objects(self) -> Collection[str]:
+        """See ObjectChoice."""
+        return self._objects.names
+
+    def check_other(self, item: str, goal: Array) -> None:
+        """See ObjectChoice."""
+        self._objects.check(item)
+        self._around(item).check_goal(goal)
+
+    def use(self, item: str) -> None:
+        """See ObjectChoice."""
+        self.surroundings = self._around(item)
+        self.object = self._peers.item = item
+
+    def _around(self, item: str) -> Surroundings:
+        if item == self.object:
+            return self.surroundings
+        return self._objects.around(item, self._beliefs.current, self.surroundings.grid)
+
     # The world
 
     def _take_map(self, grid: Grid) -> None:
@@ -174,20 +192,12 @@ class SupervisorNode(Node):
     def _on_scenario(self, message: String) -> None:
         """Another world: a job ends when its robot or its object is not what it was."""
         try:
-            values = yaml.safe_load(message.data)
-            bodies = values.get("robots") or {}, values.get("objects") or {}
-            robot, item = bodies[0].get(self.robot), bodies[1].get(self.object)
-            now = [None if b is None else b["type"] for b in (robot, item)]
-        except (yaml.YAMLError, AttributeError, KeyError, TypeError) as error:
-            self._diagnostics.refuse(
-                self.names.world("scenario"), f"the message is not a scenario: {error}"
-            )
+            ended = self._objects.take_world(message.data, self.object)
+        except ValueError as error:
+            self._diagnostics.refuse(self.names.world("scenario"), str(error))
             return
-        before, self._world = self._world, now
-        if before is not None and before != now:
-            gone = [n for n, b in zip((self.robot, self.object), now, strict=True) if b is None]
-            what = f"without {' and '.join(gone)}" if gone else "with another robot or object"
-            self.end_job(JobError.UNKNOWN_OBJECT, f"another scenario was loaded, {what}")
+        if ended:
+            self.end_job(JobError.UNKNOWN_OBJECT, ended)
 
     def _on_frame(self, frame: Frame) -> None:
         """Frames come every 50 ms."""
@@ -233,11 +243,12 @@ class SupervisorNode(Node):
         pose: Array | None = self._poses.pose(name)
         return pose
 
-    def _touching(self) -> bool:
-        robot, item = self._pose(self.robot), self._pose(self.object)
-        if robot is None or item is None:
-            return False
-        return self.surroundings.touching(robot, item)
+    def _touched(self) -> tuple[str, Surroundings, Array] | None:
+        """The object that the robot may be touching, whoever left it there."""
+        robot = self._pose(self.robot)
+        if robot is None:
+            return None
+        return self._objects.touched(robot, self.object, self._pose, self._around)
 
     # The machine and its requests
 
@@ -300,6 +311,9 @@ class SupervisorNode(Node):
                 peers.path(number, robot, wait, circles, crowded)
             case commands.FollowPush(segment):
                 peers.push(number, segment, near.push(segment), heartbeat)
+            case commands.FollowRetreat() if (touched := self._touched()) is not None:
+                name, near, there = touched
+                peers.move(number, *near.retreat(robot, there), heartbeat, name)
             case _:
                 peers.move(number, *near.motion(command, robot, item), heartbeat)
 

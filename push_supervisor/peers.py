@@ -51,7 +51,8 @@ _ONLY_A_BODY_MATTERS = (  # failures that others who stand in the way can cause
 class Peers:
     """Asks for one robot and one object.
 
-    answered, sign: called with the number of the question.
+    item: name of the object that questions are about. answered, sign: called with the number of
+    the question.
     """
 
     def __init__(
@@ -63,7 +64,7 @@ class Peers:
         answered: Answered,
         sign: Callable[[int], None],
     ) -> None:
-        self._robot, self._item = robot, item
+        self._robot, self.item = robot, item
         self._answered, self._sign = answered, sign
         self._planner = GoalClient(node, PlanPush, names.team("plan_push"))
         self._paths = node.create_client(PlanRobotPath, names.team("plan_robot_path"))
@@ -96,7 +97,7 @@ class Peers:
         robot: ``(3,)`` its pose."""
         request = PlanPush.Goal(
             mode=PlanPush.Goal.PREEMPTIVE if preemptive else PlanPush.Goal.DIRECT,
-            object=self._item,
+            object=self.item,
             robot=self._robot,
             start=pose_stamped_to_ros(start, stamp),
             goal=pose_stamped_to_ros(goal, stamp),
@@ -157,11 +158,14 @@ class Peers:
 
         self._paths.call_async(request).add_done_callback(done)
 
-    def move(self, number: int, way: Trajectory, circles: Array, heartbeat: float) -> None:
-        """Have the robot drive. heartbeat: [s] without one after which it is to stop."""
+    def move(
+        self, number: int, way: Trajectory, circles: Array, heartbeat: float, item: str = ""
+    ) -> None:
+        """Have the robot drive. heartbeat: [s] without one after which it is to stop. item: the
+        object that it may be close to, where that is another one."""
         goal = FollowTrajectory.Goal(
             mode=FollowTrajectory.Goal.MOVE,
-            object=self._item,
+            object=item or self.item,
             trajectory=trajectory_to_ros(way),
             obstacles=circles_to_ros(circles),
             heartbeat_timeout=heartbeat,
@@ -172,7 +176,7 @@ class Peers:
         """Have the robot push."""
         goal = FollowTrajectory.Goal(
             mode=FollowTrajectory.Goal.PUSH,
-            object=self._item,
+            object=self.item,
             trajectory=trajectory_to_ros(segment.trajectory),
             contact=pose_to_ros(segment.grasp),
             curvature_min=segment.limits.minimum,

@@ -138,7 +138,7 @@ def test_goals_are_found_with_the_stamps_of_their_jobs(tmp_path, scenario):
         writer.write(topic, round(1e9 * moment), bytes(serialize_message(message)))
 
     def state(moment, job, number, goal):
-        message = JobState(system="single", state=number, job=job)
+        message = JobState(system="single", state=number, job=job, object="box")
         message.header.stamp = time_to_ros(moment)
         message.goal = pose_stamped_to_ros(goal, 0.0)
         put("/job_state", moment + 0.01, message)

@@ -44,7 +44,8 @@ GROUP_NODES = {"group": ("group", "/"), "optimizer": ("optimizer", "/")}
 SWARM_NODES = {"swarm": ("swarm", "/")}
 AGENT_NODES = {"swarm_agent": (f"agent_{ROBOT}", "/")}
 ESTIMATOR_NODES = {"estimator": ("estimator", "/")}
-CROWD_NODES = {**GROUP_NODES, **SWARM_NODES, **AGENT_NODES, **ESTIMATOR_NODES}
+REARRANGE_NODES = {"rearranger": ("rearranger", "/")}
+CROWD_NODES = {**REARRANGE_NODES, **GROUP_NODES, **SWARM_NODES, **AGENT_NODES, **ESTIMATOR_NODES}
 
 
 @pytest.fixture(scope="module")
@@ -56,6 +57,7 @@ def graph():
             "single",
             {**NODES, **ESTIMATOR_NODES},
         ),
+        **look(load_scenario("rearrange"), "rearrange", REARRANGE_NODES),
         **look(load_scenario("group-ellipse"), "group", GROUP_NODES),
         **look(load_scenario("swarm-square"), "swarm", SWARM_NODES),
         **look(two_that_decide_for_themselves(), "swarm", AGENT_NODES),
@@ -105,7 +107,7 @@ def look(scenario, system, nodes):
 
 
 def test_every_node_has_a_row_and_no_other():
-    assert {row[0] for row in table("node")[:9]} == {*NODES, *CROWD_NODES}
+    assert {row[0] for row in table("node")[:10]} == {*NODES, *CROWD_NODES}
 
 
 @pytest.mark.parametrize("node", [*NODES, *CROWD_NODES])

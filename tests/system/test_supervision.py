@@ -310,7 +310,7 @@ def test_a_world_with_other_bodies_ends_the_job(run):
     run.until(lambda: run.state.refusals == 1, 5.0)
     assert run.state.refusal_code == JobError.UNKNOWN_OBJECT
     run.worlds.publish(String(data=text))
-    run.until(lambda: run.run.supervisor._world[1] is not None, 5.0)
+    run.until(lambda: run.run.supervisor._objects._there("box")[1] is not None, 5.0)
     run.by_topic(run.goal)
     run.until(lambda: run.state.job == 2, 5.0)
     run.reached(run.goal)

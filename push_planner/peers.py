@@ -1,0 +1,76 @@
+"""The supervisor, which makes the moves of a rearrangement: a goal out, its end back."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.node import Node
+
+from push_model import se2
+from push_model.arrays import Array
+from push_model.jobs import JobError
+from push_msgs.action import MoveObject
+from push_msgs.msg import JobState
+from push_ros.actions import GoalClient
+from push_ros.conversions import pose_stamped_to_ros
+from push_ros.names import Names
+from push_ros.qos import LATCHED
+from push_ros.validation import InvalidMessage, stamped_pose
+
+_SAME = 1e-6  # [m], [rad] within which a job of the supervisor is the one that was asked for
+
+
+class Mover:
+    """Has the supervisor bring one object to one goal at a time.
+
+    ended: called once for each goal, with the code of its end and why; not after ``forget``.
+    """
+
+    def __init__(self, node: Node, names: Names, ended: Callable[[JobError, str], None]) -> None:
+        self._ended = ended
+        self._client = GoalClient(node, MoveObject, names.team("move_object"))
+        self._asked: tuple[str, Array] | None = None
+        self._begun = False  # whether the supervisor is seen to work on it
+        node.create_subscription(JobState, names.team("job_state"), self._on_job, LATCHED)
+
+    @property
+    def ready(self) -> bool:
+        """Whether the supervisor is there."""
+        return bool(self._client.ready)
+
+    def move(self, item: str, goal: Array, stamp: float) -> None:
+        """Ask for an object at a goal ``(3,)``. stamp: [s] of the poses."""
+        self._asked, self._begun = (item, goal), False
+        request = MoveObject.Goal(object=item, goal=pose_stamped_to_ros(goal, stamp))
+        self._client.send(request, self._on_result)
+
+    def forget(self) -> None:
+        """Cancel what was asked for, if anything."""
+        self._asked = None
+        self._client.forget()
+
+    def _end(self, code: JobError, why: str) -> None:
+        if self._asked is not None:
+            self.forget()
+            self._ended(code, why)
+
+    def _on_result(self, result: Any) -> None:
+        if result is None:
+            self._end(JobError.NODE_LOST, "the supervisor rejected the goal")
+        else:
+            self._end(JobError(result.error_code), str(result.error_msg))
+
+    def _on_job(self, state: JobState) -> None:
+        """A supervisor that was restarted continues its job, but its answer is lost."""
+        if self._asked is None or state.object != self._asked[0]:
+            return
+        try:
+            off = stamped_pose(state.goal, "the goal") - self._asked[1]
+        except InvalidMessage:
+            return
+        if math.hypot(off[0], off[1]) > _SAME or abs(se2.wrap(float(off[2]))) > _SAME:
+            return
+        idle = state.state == JobState.IDLE and not state.plan_ready
+        if idle and self._begun:
+            self._end(JobError(state.error_code), str(state.reason))
+        self._begun = not idle
