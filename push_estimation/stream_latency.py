@@ -22,6 +22,8 @@ _HOLE = 0.15  # [s] between frames or commands that ends a window
 _FEWEST = 14  # frames of a window
 _UNEXPLAINED = 0.06  # share of the square of a commanded motion that may be missing
 _SMALL = (1e-3, 6e-3)  # [m], [rad] root mean square that may be missing beside it
+_MODEL = 0.02  # share of a commanded motion by which the model of it errs, as slip that varies does
+_EXACT = (5e-5, 3e-4)  # [m], [rad] root mean square by which it errs beside that
 _PLAIN = 0.05  # of the scatter's square: that of the motion below which a window tells nothing
 _STALE = 2000  # commands that are kept at least
 _OUTLIER = 0.01  # share of windows that anything may have happened in
@@ -194,7 +196,9 @@ class StreamLatency:
                 continue
             told = True
             free = len(y) - 3
-            log -= 0.5 * free * np.log(np.maximum(errors, 1e-3 * float(errors.max())))
+            # Without noise, what is left is the error of the model, which decides nothing.
+            unknown = len(y) * (_MODEL**2 * asked + _EXACT[column] ** 2)
+            log -= 0.5 * free * np.log(errors + unknown)
         if strange:
             self.strange += 1
             return Verdict(

@@ -90,3 +90,24 @@ def test_the_lag_of_the_robot_is_taken_off():
     assert lagging.interval().value == pytest.approx(plain.interval().value - 0.02, abs=2e-3)
     with pytest.raises(SettingsError, match="two steps"):
         LatencySettings(low=0.1, high=0.1)
+
+
+def test_without_noise_the_slip_of_the_wheels_decides_nothing():
+    """Poses are exact and the robot turns steadily, by 1 % less than it is told, more or less."""
+    for seed in range(30):
+        draw = np.random.default_rng(seed)
+        estimate = StreamLatency(LatencySettings(low=0.0, high=0.15))
+        latency, phase = draw.uniform(0.0, 0.1), draw.uniform(0.0, 6.0, 4)
+        pose, commands = np.zeros(3), []
+        for k in range(2500):
+            time = 0.01 * k
+            turning = 0.3 + 0.004 * np.sin(1.3 * time + phase[0])
+            commands.append((0.1, turning if time % 8.0 < 6.0 else -turning))
+            estimate.command(1.0 + time, *commands[-1])
+            estimate.pose(1.0 + time, pose.copy())
+            v, omega = commands[max(0, k - round(100.0 * latency))]
+            slip = 0.99 + 0.002 * np.sin(0.9 * time + phase[1:3])
+            pose = unicycle_step(pose, slip[0] * v, slip[1] * omega, 0.01)
+        interval = estimate.interval()
+        assert interval.low <= round(100.0 * latency) / 100.0 <= interval.high, seed
+        assert estimate.widened == 0
