@@ -1,6 +1,7 @@
 """Write a report with pictures from a bag, or from the folder of a study."""
 
 import argparse
+import math
 import sys
 from pathlib import Path
 
@@ -43,6 +44,9 @@ def run(arguments: argparse.Namespace) -> int:
         return 2
     if arguments.attach:
         attach(bag, [out / name for name in PRODUCTS if (out / name).is_file()])
+    if math.isnan(errors["position_error_m"]):
+        print(f"{out}: no final error, because the bag holds no goal or no pose of the object")
+        return 0
     word = "final error" if errors["finished"] else "the recording ends in mid-job; error then"
     print(
         f"{out}: {word} {1e3 * errors['position_error_m']:.1f} mm, "

@@ -153,6 +153,7 @@ class VelocityFollower:
         """See Follower."""
         self._object, self._told_push = request.object, task.push
         self._alarmed = False
+        self._reported = -math.inf  # the clock may have been reset
         self.tracker.start(task)
         if self._beliefs.current.values:
             self._take_up()

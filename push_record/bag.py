@@ -2,6 +2,7 @@
 little, readable by rosbag2, Foxglove, the ``rosbags`` and the ``mcap`` libraries."""
 
 import contextlib
+import struct
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -199,7 +200,7 @@ def _records(bag: Path) -> Iterator[Any]:
     with bag_file(bag).open("rb") as file:
         try:
             yield from StreamReader(file).records
-        except (McapError, EOFError, ValueError):
+        except (McapError, EOFError, ValueError, struct.error):
             return
 
 
@@ -263,6 +264,8 @@ def older_types(bag: Path) -> list[str]:
 
 def recover(bag: Path, folder: Path) -> int:
     """Copy the readable part of a truncated bag into a new one; returns the message count."""
+    if folder.exists():
+        raise FileExistsError(f"{folder} exists already; choose another folder for the bag")
     writer = BagWriter(folder, read_metadata(bag))
     count = 0
     try:

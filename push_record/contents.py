@@ -1,7 +1,7 @@
 """The contents of a bag as time series: bodies, jobs of all teams, controllers, collisions."""
 
 from collections.abc import Container
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -28,6 +28,7 @@ STATUS = (
 )
 """Columns of a controller's status, see push_msgs/ControllerStatus."""
 
+_RESET = 0.5  # [s] by which the clock goes back when the world is reset
 _SPACING = 0.02  # [s] shortest time between frames that are kept
 _MOMENTS = 2.0  # [s] between complete reports that are kept for pictures
 _MOVING = (1, 2)  # modes MOVE and PUSH of ControllerStatus
@@ -116,6 +117,8 @@ class Job:
 class BagContents:
     """time ``(n,)`` [s]; poses ``(n, 3)`` by body, ground truth, nan where unknown.
 
+    If the world was reset during the recording, times go on where they were.
+
     status: by robot, by column of STATUS ``(k,)``; jobs: by the team's namespace.
     """
 
@@ -151,6 +154,7 @@ class _Frames:
         self.frames: list[Array] = []
         self._last: tuple[float, Array] | None = None
         self._newest: float | None = None
+        self.shift = 0.0  # [s] that times go on after the world was reset
 
     def take(self, message: Any) -> None:
         frame = np.full((len(self._index), 3), np.nan)
@@ -158,7 +162,11 @@ class _Frames:
         if known:
             rows, columns = np.array(known).T
             frame[rows] = np.column_stack([message.x, message.y, message.theta])[columns]
-        time = _seconds(message.header.stamp)
+        time = _seconds(message.header.stamp) + self.shift
+        if self._newest is not None and time < self._newest - _RESET:
+            self._keep()
+            self.shift += self._newest - time
+            time = self._newest
         self._last = (time, frame)
         self._newest = time
         if not self.times or not 0.0 <= time - self.times[-1] < _SPACING - 1e-9:
@@ -225,12 +233,12 @@ def load(bag: Path | str, moments: float = _MOMENTS) -> BagContents:
         "controller/status",
     )
     for record in read_bag(bag, cast(set[str], wanted)):
-        m = record.message
+        m, shift = record.message, frames.shift
         if record.topic.endswith("/ground_truth/poses"):
             frames.take(m)
         elif record.topic.endswith("/controller/status"):
             if m.mode in _MOVING:
-                row = [_seconds(m.header.stamp), *(getattr(m, k) for k in STATUS[1:])]
+                row = [_seconds(m.header.stamp) + shift, *(getattr(m, k) for k in STATUS[1:])]
                 status.setdefault(str(m.robot), []).append(row)
         elif record.topic.endswith("/report"):
             try:
@@ -238,14 +246,14 @@ def load(bag: Path | str, moments: float = _MOMENTS) -> BagContents:
             except InvalidMessage:  # what somebody recorded need not be right
                 continue
             told = series.setdefault(record.topic, ReportSeries(str(m.method), moments))
-            told.take(_seconds(m.header.stamp), report)
+            told.take(_seconds(m.header.stamp) + shift, report)
         elif record.topic.endswith("/contacts"):
-            collisions.take(_seconds(m.header.stamp), m.body_a, m.body_b)
+            collisions.take(_seconds(m.header.stamp) + shift, m.body_a, m.body_b)
         else:
             space = record.topic.rpartition("/")[0] + "/"
             job = contents.jobs.setdefault(space, Job(space))
             if record.topic.endswith("/job_state"):
-                _take_state(job, m)
+                _take_state(job, m, shift)
             elif record.topic.endswith("/group_plan"):
                 job.plans.append(from_group_plan(m, frames.now, _pieces(job)))
             else:
@@ -258,6 +266,17 @@ def load(bag: Path | str, moments: float = _MOMENTS) -> BagContents:
         table = np.array(rows, dtype=np.float64)
         contents.status[robot] = dict(zip(STATUS, table.T, strict=True))
     return contents
+
+
+def until(contents: BagContents, end: float) -> BagContents:
+    """What was recorded before a time [s]: frames and states of jobs."""
+    kept = contents.time < end
+    jobs = {
+        space: replace(job, states=[s for s in job.states if s.time < end])
+        for space, job in contents.jobs.items()
+    }
+    poses = {name: rows[kept] for name, rows in contents.poses.items()}
+    return replace(contents, time=contents.time[kept], poses=poses, jobs=jobs)
 
 
 def _give(jobs: dict[str, Job], topic: str, series: ReportSeries) -> None:
@@ -279,10 +298,10 @@ def _pieces(job: Job) -> int:
     return len(job.pushes)
 
 
-def _take_state(job: Job, message: Any) -> None:
+def _take_state(job: Job, message: Any, shift: float) -> None:
     job.system, job.object = str(message.system), str(message.object)
     job.robots = tuple(str(r) for r in message.robots)
-    stamp = _seconds(message.header.stamp)
+    stamp = _seconds(message.header.stamp) + shift
     if message.goal.header.frame_id:
         try:
             goal = planar_pose(message.goal.pose, "the goal")

@@ -16,7 +16,7 @@ from push_bringup.systems import LIVE, nodes_of
 from push_model.settings import SettingsError
 from push_msgs.msg import Belief
 from push_record.compare import Comparison, compare_bags
-from push_record.contents import BagContents, Job, State, load
+from push_record.contents import BagContents, Job, State, load, until
 from push_record.parting import Parting, partings
 from push_record.revision import revision, versions
 from push_record.run_of_bag import Call, CannotRerun, Input, RunOfBag, run_of_bag
@@ -118,6 +118,8 @@ def rerun(
     if run.repeatable:
         return Rerun(run, out, setup, compare_bags(bag, out), (), ())
     pair = load(bag), load(out)
+    if run.restarted:
+        pair = until(pair[0], run.end), until(pair[1], run.end)
     return Rerun(run, out, setup, None, tuple(partings(*pair)), _states(*pair))
 
 

@@ -155,16 +155,29 @@ def _series(
             t, v = np.array(times), np.array(values)
             good = np.isfinite(v)
             label = name if name not in found else f"{name} ({report.method})"
-            found[label] = _one(unit, t[good], v[good])
+            found[label] = _one(unit, t[good], v[good], report.limits.get(name, np.nan))
     return found
 
 
-def _one(unit: str, times: Array, values: Array) -> dict[str, Any]:
-    if len(times) > _POINTS:
-        kept = np.linspace(0, len(times) - 1, _POINTS).astype(int)
-        times, values = times[kept], values[kept]
+def _one(unit: str, times: Array, values: Array, limit: float = np.nan) -> dict[str, Any]:
+    kept = _thinned(values)
+    told = {} if not np.isfinite(limit) else {"limit": float(f"{limit:.5g}")}
     return {
         "unit": unit,
-        "t": np.round(times, 3).tolist(),
-        "v": [float(f"{v:.5g}") for v in values],
+        "t": np.round(times[kept], 3).tolist(),
+        "v": [float(f"{v:.5g}") for v in values[kept]],
+        **told,
     }
+
+
+def _thinned(values: Array) -> Array:
+    """Indices of at most ``_POINTS`` values: the least and the greatest of each stretch."""
+    if len(values) <= _POINTS:
+        return np.unique(np.arange(len(values)))
+    edges = np.linspace(0, len(values), _POINTS // 2 + 1).astype(int)
+    ends = [
+        begin + extreme
+        for begin, end in zip(edges, edges[1:], strict=False)
+        for extreme in (int(values[begin:end].argmin()), int(values[begin:end].argmax()))
+    ]
+    return np.unique(ends)

@@ -45,11 +45,13 @@ export class Charts {
   // all: [label, series] pairs; marks: [time, text] of states; cursor: [s], or null
   show(all, marks, cursor) {
     this.marks = marks; this.cursor = cursor;
-    const charts = grouped(all);
+    const charts = grouped(all), ink = getComputedStyle(this.host).color;
+    const times = [...charts.values()].flat().flatMap(l => l.t.length ? [l.t[0], l.t.at(-1)] : []);
+    this.range = times.length ? [Math.min(...times), Math.max(...times)] : null;   // the same in all charts
     for (const title of this.plots.keys()) if (!charts.has(title)) this.drop(title);
     for (const [title, lines] of charts) {
-      const key = lines.map(l => l.name).join("|"), old = this.plots.get(title);
-      if (old?.key !== key) { this.drop(title); this.make(title, lines, key); }
+      const key = [ink, ...lines.map(l => l.name)].join("|"), old = this.plots.get(title);
+      if (old?.key !== key) { this.drop(title); this.make(title, lines, key, ink); }
       this.plots.get(title).plot.setData(columns(lines));
     }
   }
@@ -67,15 +69,15 @@ export class Charts {
     old.plot.destroy(); old.box.remove(); this.plots.delete(title);
   }
 
-  make(title, lines, key) {
+  make(title, lines, key, ink) {
     const box = document.createElement("div"), unit = SCALES[lines[0].unit]?.[0] ?? lines[0].unit;
     box.className = "chart";
     this.host.append(box);
-    const ink = getComputedStyle(this.host).color, grid = {stroke: "#8884", width: 1};
-    const axis = {stroke: ink, grid, ticks: grid, font: "11px system-ui", size: 46};
+    const grid = {stroke: "#8884", width: 1};
+    const axis = {stroke: ink, grid, ticks: grid, font: "11px system-ui", size: 46, values: (_, ticks) => ticks.map(v => v === null ? "" : String(Number(v.toPrecision(6))))};
     const options = {
       title: title.startsWith("in ") ? `in ${unit}` : unit ? `${title} [${unit}]` : title, width: 300, height: HEIGHT,
-      scales: {x: {time: false}, y: {range: (_, low, high) => span(low, high)}}, axes: [{...axis, size: 24}, axis], cursor: {sync: {key: "charts"}, drag: {setScale: false}},
+      scales: {x: {time: false, range: (_, low, high) => this.range ?? [low ?? 0, high ?? 1]}, y: {range: (_, low, high) => span(low, high)}}, axes: [{...axis, size: 24}, axis], cursor: {sync: {key: "charts"}, drag: {setScale: false}},
       series: [{label: "s", value: (_, v) => v?.toFixed(2) ?? "–"}, ...lines.map(({name}, i) => ({
         label: name, stroke: COLOURS[i % COLOURS.length], width: 1.5, dash: i > 2 ? [6, 3] : [], points: {show: false},
         value: (_, v) => v === null || v === undefined ? "–" : Number(v.toPrecision(4))}))],

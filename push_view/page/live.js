@@ -106,10 +106,11 @@ const tools = {
   move: {
     down(metres) {
       const i = bodyAt(model, metres), pose = poseOf(model, i);
-      if (!pose) return false;
+      if (!pose) { sent = {space: chosen, stamp: "", failed: "there is no body at this place"}; return; }
       held = {name: model.bodies.names[i], from: metres, pose};
     },
     move(metres) {
+      if (!held) return;
       const {pose, from, name} = held;
       scene.ghost = {name, pose: [pose.x + metres.x - from.x, pose.y + metres.y - from.y, pose.theta]};
     },
@@ -140,7 +141,7 @@ async function offerStart() {
   for (const [id, values] of [["system", options.systems], ["scenario", options.scenarios]]) {
     at(id).replaceChildren(...values.map(value => new Option(value, value)));
   }
-  const choose = () => { at("scenario").value = options.examples[at("system").value] ?? at("scenario").value; };
+  const choose = () => { at("scenario").value = options.examples[at("system").value] ?? options.scenarios[0]; };
   at("system").onchange = choose; choose();
   at("start").onclick = () => request("start", {system: at("system").value, scenario: at("scenario").value});
   at("stop").onclick = () => request("stop");

@@ -3,6 +3,8 @@
 export const LONGEST_SILENCE = 800;   // [ms] without an event after which the server counts as gone
 const TRAIL_STEP = 0.004, TRAIL_LENGTH = 3000, TRAILED = 60;   // [m], points, bodies
 const LENGTH = 1e-4, ANGLE = 1e-3;    // units of poses: [m], [rad]
+const JUMP = 0.2;                     // [m] between two poses, of a body that was put somewhere else
+const OWN = ["position error", "orientation error"];   // of the object from its goal
 const SPACING = 0.1, KEPT = 6000;     // [s] between errors that are kept; points of a series
 
 export const emptyModel = () => ({
@@ -58,7 +60,9 @@ function takePoses(model, data) {
     if (!pose) continue;
     if (!model.trails.has(i)) model.trails.set(i, []);
     const trail = model.trails.get(i), last = trail.at(-1);
-    if (!last || Math.hypot(last[0] - pose.x, last[1] - pose.y) > TRAIL_STEP) trail.push([pose.x, pose.y]);
+    const way = last ? Math.hypot(last[0] - pose.x, last[1] - pose.y) : Infinity;
+    if (last && way > JUMP) trail.length = 0;
+    if (way > TRAIL_STEP) trail.push([pose.x, pose.y]);
     if (trail.length > TRAIL_LENGTH) trail.splice(0, TRAIL_LENGTH / 3);
   }
 }
@@ -95,8 +99,11 @@ const takers = {
     const team = teamOf(model, data.space);
     Object.assign(team, {rows: data.rows, shapes: data.shapes});
     if (model.time === null || !busy(team)) return;
-    for (const {name, unit, limit, value} of data.rows) {
-      if (value !== undefined) record(team, name, unit, limit, model.time, value);
+    let method = "";
+    for (const {name, text, unit, limit, value} of data.rows) {
+      if (name === "method") method = text;
+      const label = OWN.includes(name) ? `${name} (${method})` : name;   // its own error is another figure
+      if (value !== undefined) record(team, label, unit, limit, model.time, value);
     }
   },
 };
@@ -159,6 +166,7 @@ export function answerTo(sent, team) {
   if (state.refusals > 0 && state.refused_stamp === sent.stamp) {
     return {kind: "refused", text: `the goal was refused: ${state.refusal}`};
   }
+  if (state.stamp === sent.stamp && state.state === "IDLE" && state.code) return {kind: "refused", text: state.reason};
   if (state.stamp === sent.stamp) {
     return {kind: "taken", text: state.plan_ready ? "the plan waits for Execute" : "the goal is accepted"};
   }

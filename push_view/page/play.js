@@ -62,7 +62,7 @@ function makeTimeline() {
   at("speed").onchange = event => { speed = Number(event.target.value); };
   at("loop").onchange = event => { loop = event.target.checked; };
   addEventListener("keydown", event => {
-    if (event.target.matches("input, select, button")) return;
+    if (event.target.matches("select, #loop, textarea")) return;
     const act = {" ": at("go"), ArrowLeft: at("back"), ArrowRight: at("on")}[event.key];
     if (act) { event.preventDefault(); act.onclick(); }
   });

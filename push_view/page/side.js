@@ -34,10 +34,13 @@ function numbers(model, team) {
   rows.push(["to the goal", gap]);
   if (state?.step[1]) rows.push(["step", `${state.step[0]} of ${state.step[1]}`]);
   const {cost, gap: above} = team?.plan ?? {};
-  if (cost !== undefined) rows.push(["cost of the plan", `${cost.toFixed(1)} s`], ["above the best", `at most ${Math.ceil(100 * above)} %`]);
+  if (cost !== undefined) {
+    const old = busy(team) || state?.plan_ready ? "" : "former";
+    rows.push(["cost of the plan", `${cost.toFixed(1)} s`, old], ["above the best", `at most ${Math.ceil(100 * above)} %`, old]);
+  }
   if (state?.replans) rows.push(["new plans", `${state.replans}`]);
   const told = (team?.rows ?? []).map(r => [r.name, r.text, outside(r) ? "bad" : ""]);
-  if (told.length && !busy(team)) rows.push([state?.plan_ready ? "before this plan:" : "of the job that has ended:", "", "former"]);
+  if (told.length && state?.job && !busy(team)) rows.push([state?.plan_ready ? "before this plan:" : "of the job that has ended:", "", "former"]);
   return [...rows, ...told.map(([k, v, c]) => [k, v, busy(team) ? c : "former"])];
 }
 

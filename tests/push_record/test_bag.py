@@ -77,6 +77,17 @@ def test_killed_writer_keeps_its_whole_chunks(tmp_path):
         assert sum(1 for _ in reader.messages()) == len(kept)
 
 
+@pytest.mark.parametrize("length", [0, 5, 8, 9, 20, 100, 1000])
+def test_a_file_that_is_cut_anywhere_is_read_as_far_as_it_goes(tmp_path, length):
+    write(tmp_path / "bag", 50).close()
+    file = bag_file(tmp_path / "bag")
+    file.write_bytes(file.read_bytes()[:length])
+    assert list(read_bag(tmp_path / "bag")) == [] or length == 1000
+    assert recover(tmp_path / "bag", tmp_path / "new") >= 0
+    with pytest.raises(FileExistsError, match="exists already; choose another folder"):
+        recover(tmp_path / "bag", tmp_path / "new")
+
+
 def test_full_disk_ends_the_recording_and_nothing_else(tmp_path, monkeypatch):
     writer = write(tmp_path / "bag", 3000)
 

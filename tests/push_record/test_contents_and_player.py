@@ -8,7 +8,7 @@ from std_msgs.msg import String
 from push_model.settings import SettingsError
 from push_msgs.msg import ControllerStatus, JobState, Poses
 from push_record.bag import BagWriter, read_bag
-from push_record.contents import load
+from push_record.contents import load, until
 from push_record.player import PlayerNode
 from push_record.recorder import RecorderNode, heard_scenario
 from push_record.topics import MANY, recorded_topics, shown_topics
@@ -55,6 +55,36 @@ def write_bag(folder, scenario, namespace="/a/", count=50):
     put("south/job_state", 1.5, state)
     put("north/job_state", 1.6, JobState(state_name="IDLE", reason="no goal", object="box2"))
     writer.close()
+
+
+def test_a_world_that_was_reset_goes_on_in_time(tmp_path, teams):
+    """Two runs of one second in one bag: nothing is drawn at two places at one time."""
+    from rclpy.serialization import serialize_message
+
+    writer = BagWriter(tmp_path / "bag", {"scenario": teams.text, "scenario_name": teams.name})
+    for topic, kind in recorded_topics(teams, "").items():
+        writer.add_topic(topic, kind.type_name, kind.latched)
+    name, stamp = next(iter(teams.robots)), 0
+    for run in range(2):
+        for k in range(51):
+            moment, stamp = 0.02 * k, stamp + 20_000_000
+            frame = poses_to_ros({name: np.array([run + 0.01 * k, 0.0, 0.0])}, moment)
+            writer.write("/ground_truth/poses", stamp, bytes(serialize_message(frame)))
+            if k == 25:
+                state = JobState(state_name="PUSHING", reason=f"run {run}", object="box1")
+                state.header.stamp = time_to_ros(moment)
+                writer.write("/south/job_state", stamp, bytes(serialize_message(state)))
+    writer.close()
+    contents = load(tmp_path / "bag")
+    assert (np.diff(contents.time) >= 0.0).all()
+    assert contents.time[-1] == pytest.approx(2.0)
+    (job,) = [job for job in contents.jobs.values() if job.states]
+    assert [s.time for s in job.states] == pytest.approx([0.5, 1.5])
+    first = until(contents, 1.0)
+    assert first.time[-1] < 1.0 and first.poses[name][:, 0].max() < 0.6
+    assert [[s.reason for s in job.states] for job in first.jobs.values() if job.states] == [
+        ["run 0"]
+    ]
 
 
 def test_contents_by_team(tmp_path, teams):

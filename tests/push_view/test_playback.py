@@ -8,7 +8,7 @@ import pytest
 
 from planar_push.main import main
 from push_msgs.msg import GroupPlan, JobState
-from push_view.playback import playback_json
+from push_view.playback import _one, playback_json
 from push_view.playback_server import PlaybackServer
 from tests.push_view.browser import CHROMIUM, Browser
 from tests.push_view.test_report import Bag, crowd
@@ -64,6 +64,17 @@ def test_a_long_bag_of_many_bodies_is_thinned(scenario, tmp_path, monkeypatch):
     monkeypatch.setattr("push_view.playback.VALUES", 600)
     data = playback_json(written(scenario, tmp_path / "a"))
     assert len(data["t"]) == 100 and data["t"][0] == 5.0 and data["t"][-1] == 15.0
+
+
+def test_a_long_series_keeps_its_peaks():
+    values = np.zeros(20_000)
+    peaks = np.array([17, 4_321, 9_999, 19_998])
+    values[peaks] = [3.0, -2.0, 1.0, 5.0]
+    sent = _one("m", np.arange(20_000.0), values, 2.5)
+    assert len(sent["t"]) <= 3_000 and sent["limit"] == 2.5
+    kept = dict(zip(sent["t"], sent["v"], strict=True))
+    assert [kept.get(float(p)) for p in peaks] == [3.0, -2.0, 1.0, 5.0]
+    assert "limit" not in _one("m", np.arange(3.0), np.ones(3))
 
 
 def test_wrong_arguments_are_told(scenario, tmp_path, capsys):
