@@ -208,6 +208,27 @@ def test_the_range_of_a_chart_is_that_of_its_values(shown):
     assert below < 2.0 < above
 
 
+def test_errors_of_the_object_and_of_a_method_are_two_lines(shown):
+    """Figures of a report that are called like the object's own error; and a goal that is taken and
+    then cannot be worked on."""
+    names, kind, text = shown.value(
+        MODULES
+        + """
+        const model = m.emptyModel(), team = {space: "/", state: "PUSHING", job: 1, object: "box",
+          step: [0, 0], stamp: "7", code: 0, goal: [0, 0, 0], refusals: 0, reason: "on"};
+        m.take(model, "team", team, 0); model.time = 1.0;
+        const rows = [{name: "method", text: "group"}, {name: "phase", text: "push"},
+          {name: "position error", text: "", value: 0.001, unit: "m"},
+          {name: "speed", text: "", value: 0.1, unit: "m/s"}];
+        m.take(model, "panel", {space: "/", rows, shapes: []}, 0);
+        m.take(model, "team", {...team, state: "IDLE", code: 301, reason: "leave it unset"}, 0);
+        const {kind, text} = m.answerTo({space: "/", stamp: "7"}, model.teams.get("/"));
+        return [[...model.teams.get("/").series.keys()], kind, text]; })()"""
+    )
+    assert names == ["position error (group)", "speed"]
+    assert (kind, text) == ("refused", "leave it unset")
+
+
 def test_what_counts_as_silence(shown):
     """The page's own judgement, with a clock passed in."""
     assert shown.value(
