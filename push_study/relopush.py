@@ -8,7 +8,7 @@ stays within the bounds and its nose reaches 0.3 m beyond them. Here an e-puck p
 All lengths are scaled by 0.09 / 0.15, and walls stand where the car's nose would end.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,7 +22,8 @@ _SIZE = (4.0, 5.4)  # [m] bounds of the rear axle
 _NOSE = 0.3  # [m] of the car, ahead of its rear axle
 _NOISE = 0.05  # [m] of every position
 _APART, _DRAWN = 0.7, (4.0, 5.2)  # [m] between all positions of the generator, and its bounds
-_TRIES = 10000
+_ROBOT_APART = 0.4  # [m] between the robot and them
+_DRAWS, _TRIES = 200, 1000  # times that all are drawn anew; places that are drawn each time
 
 _Place = tuple[float, float]
 
@@ -95,7 +96,8 @@ fourth goal has a heading of 3 rad, which is left out: their boxes may arrive on
 
 
 def scene(name: str, seed: int) -> Scene:
-    """A scene of ``SCENES`` with its noise, or one that is drawn: ``random-N`` of N boxes.
+    """A scene of ``SCENES`` with its noise, or one that is drawn: ``random-N`` of N boxes, and
+    ``shuffle-N``, in which the goal of each of N boxes is the place of another one.
 
     Raises
     ------
@@ -105,8 +107,11 @@ def scene(name: str, seed: int) -> Scene:
     kind, _, count = name.rpartition("-")
     if kind == "random" and count.isdigit() and int(count) > 0:
         return _drawn(random, int(count))
+    if kind == "shuffle" and count.isdigit() and int(count) > 1:
+        drawn = _drawn(random, int(count))
+        return replace(drawn, goals=drawn.boxes[1:] + drawn.boxes[:1])
     if name not in SCENES:
-        known = ", ".join((*SCENES, "random-N"))
+        known = ", ".join((*SCENES, "random-N", "shuffle-N"))
         raise SettingsError(f"there is no scene '{name}'; expected one of: {known}")
     nominal = SCENES[name]
 
@@ -121,17 +126,19 @@ def scene(name: str, seed: int) -> Scene:
 
 
 def _drawn(random: np.random.Generator, count: int) -> Scene:
-    places: list[np.ndarray] = []
-    for _ in range(_TRIES):
-        place = random.uniform(_APART, np.array(_DRAWN) - _APART)
-        if all(np.hypot(*(place - p)) >= _APART for p in places):
-            places.append(place)
-        if len(places) == 2 * count + 1:
-            found = [(float(x), float(y)) for x, y in places]
-            heading = float(random.uniform(-np.pi, np.pi))
-            return Scene(
-                tuple(found[:count]), tuple(found[count : 2 * count]), (*found[-1], heading)
-            )
+    """Boxes and goals at least ``_APART`` from each other, and a robot that touches no box."""
+    for _ in range(_DRAWS):
+        places: list[np.ndarray] = []
+        for _ in range(_TRIES):
+            place = random.uniform(_APART, np.array(_DRAWN) - _APART)
+            near = _APART if len(places) < 2 * count else _ROBOT_APART
+            if all(np.hypot(*(place - p)) >= near for p in places):
+                places.append(place)
+            if len(places) == 2 * count + 1:
+                found = [(float(x), float(y)) for x, y in places]
+                heading = float(random.uniform(-np.pi, np.pi))
+                boxes, goals = tuple(found[:count]), tuple(found[count : 2 * count])
+                return Scene(boxes, goals, (*found[-1], heading))
     raise SettingsError(f"no room for {count} boxes; give a smaller number")
 
 

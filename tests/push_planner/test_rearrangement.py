@@ -70,7 +70,7 @@ def test_the_scenes_of_relopush_are_solved(name):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", [*SCENES, "random-4", "random-8"])
+@pytest.mark.parametrize("name", [*SCENES, "random-4", "random-8", "shuffle-2", "shuffle-4"])
 def test_hundreds_of_scenes_are_solved(name):
     solved = 0
     for seed in range(200, 230):

@@ -16,7 +16,7 @@ from push_ros.conversions import pose_stamped_to_ros
 from push_ros.names import Names
 from push_ros.qos import COMMAND
 from push_scenario.scenario import scenario_from_mapping
-from push_study.experiments.rearrange import Watch, run_rearrangement
+from push_study.experiments.rearrange import RearrangeTask, Watch, run_rearrangement, trial
 from push_study.graph_run import LockstepRun
 
 GOALS = {"a": [0.0, 0.3, 0.0], "b": [0.3, -0.3, 0.0]}
@@ -190,3 +190,13 @@ def test_a_reset_ends_it(run):
     run.pushes("a")
     assert run.call(Reset, "/bridge/reset", Reset.Request()).success
     assert run.ends().error_code == JobError.CLOCK_RESET
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["relopush-3", "relopush-6"])
+def test_a_slice_of_the_study(name):
+    """As the study runs it, in both worlds; in relopush-6 a box is moved out of the way."""
+    for world in ("planar", "pybullet"):
+        row = trial(RearrangeTask(name, 102, "mild", world))
+        assert row["success"], row
+        assert row["moved_aside"] == (name == "relopush-6")
