@@ -1,6 +1,7 @@
 """Show a live view in the browser, where goals can be set by mouse."""
 
 import argparse
+import socket
 import sys
 
 from planar_push.arguments import add_namespace, add_port, add_scenario
@@ -32,7 +33,9 @@ def run(arguments: argparse.Namespace) -> int:
         nonlocal server
         node = ViewerNode(scenario)
         server = PageServer(node, arguments.host, arguments.port, starter=starter)
-        print(f"http://{arguments.host}:{server.port}/", flush=True)
+        everywhere = arguments.host in ("0.0.0.0", "::")
+        host = socket.gethostname() if everywhere else arguments.host
+        print(f"http://{host}:{server.port}/", flush=True)
         return node
 
     words = ["--ros-args", "-r", f"__ns:=/{arguments.namespace.strip('/')}"]

@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from push_bringup.failures import SuiteFailed
+from push_bringup.failures import DomainInUse, SuiteFailed
 from push_bringup.launcher import Launcher
 from push_bringup.preparation import check_domain, prepare
 from push_bringup.systems import SYSTEMS, system_names
@@ -71,7 +71,7 @@ class BackgroundSuite:
         def run() -> None:
             try:
                 answers.put(work())
-            except (SettingsError, SuiteFailed, OSError) as error:
+            except (SettingsError, SuiteFailed, DomainInUse, OSError) as error:
                 answers.put(ValueError(str(error)))
             except Exception as error:
                 answers.put(error)

@@ -108,10 +108,13 @@ class JobIntake:
         consider: Consider | None = None,
         memory: JobMemory | None = None,
         choice: ObjectChoice | None = None,
+        no_plan_only: str = "",
     ) -> None:
         """consider: in the place of the owner's ``check_goal``, where that takes time: answers, now
         or later, with why a goal ``(3,)`` is refused, with None where it can be worked on.
-        memory: of jobs; that of the process if it is not given. choice: of other objects."""
+        memory: of jobs; that of the process if it is not given. choice: of other objects.
+        no_plan_only: why the owner does not plan without executing; empty where it does."""
+        self._no_plan_only = no_plan_only
         others = () if choice is None else choice.names_of_objects
         self._keeper = JobKeeper(memory or JobMemory.of_process(), (item, *robots), others)
         self._run, self._since = "", math.nan
@@ -324,6 +327,9 @@ class JobIntake:
         if request.object not in ("", self._item, *others):
             text = f"unknown object '{request.object}'"
             judged(GoalRefused(JobError.UNKNOWN_OBJECT, text))
+            return
+        if request.plan_only and self._no_plan_only:
+            judged(GoalRefused(JobError.INVALID_GOAL, self._no_plan_only))
             return
         self._judge(request.goal, "move_object", judged, request.object)
 

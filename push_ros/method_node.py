@@ -123,6 +123,7 @@ class MethodNode(Node):
             *(self, names, self._diagnostics, self, chosen.name, list(team), self.object),
             consider=lambda goal, answer: self.consider_task(self._task(goal), answer),
             memory=memory,
+            no_plan_only=f"the method '{chosen.name}' plans as it goes; leave plan_only unset",
         )
         self._servers = [
             TaskServer(self, names.team(a.name), a, self, self._diagnostics.refuse)
@@ -190,11 +191,8 @@ class MethodNode(Node):
         self.check_task(self._task(goal))
 
     def take_goal(self, goal: Array, plan_only: bool) -> None:
-        """See JobOwner."""
+        """See JobOwner; goals with plan_only are refused before."""
         self.take_task(self._task(goal))
-        if plan_only:
-            text = f"the method '{self.spec.name}' plans one step at a time; leave plan_only unset"
-            self.end_job(JobError.INVALID_GOAL, text)
 
     def _task(self, goal: Array) -> Task:
         own = self.settings.get("")

@@ -75,7 +75,7 @@ def _results(contents: BagContents, errors: Mapping[str, tuple[float, float]]) -
         error = 1e3 * position, orientation
         rows.append((space, job.system, crew, job.object, *error, pushes, cost, 100.0 * gap, end))
     heads = (
-        *("team", "system", "robots", "object", "final error [mm]", "[rad]", "pushes"),
+        *("team", "system", "robots", "object", "error at the end [mm]", "[rad]", "pushes"),
         *("plan cost [s]", "above the best at most [%]", "end"),
     )
     hits = contents.collisions

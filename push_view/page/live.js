@@ -165,8 +165,10 @@ export function begin() {
     request("displace", {name, x, y, theta});
   };
   offerStart();
-  listen(KINDS, (kind, data) => { take(model, kind, data, performance.now()); fetchMap(); soon(); },
-    text => { refused = text; soon(); });
+  listen(KINDS, (kind, data) => {
+    if (kind === "bodies" && model.bodies && data.revision !== model.bodies.revision) sent = null;   // another suite
+    take(model, kind, data, performance.now()); fetchMap(); soon();
+  }, text => { refused = text; soon(); });
   setInterval(soon, 200);   // a silent server sends nothing that would say so
   soon();
 }

@@ -24,14 +24,14 @@ from push_ros.qos import COMMAND, LATCHED
 class Owner:
     """Works on a job until it is told that it is done. Goals beyond x = 5 are occupied."""
 
-    def __init__(self):
+    def __init__(self, **more):
         self.node = rclpy.create_node("owner")
         self.names = Names("/", "/red/")
         self.busy, self.plan_ready = False, False
         self.taken, self.executed = [], 0
         diagnostics = Diagnostics(self.node, self.names, dict)
         self.intake = JobIntake(
-            self.node, self.names, diagnostics, self, "single", ["epuck1"], "box"
+            self.node, self.names, diagnostics, self, "single", ["epuck1"], "box", **more
         )
         self.say("IDLE")
 
@@ -58,9 +58,27 @@ class Owner:
         self.executed += 1
 
 
-class Client:
+class Choice(Owner):
+    """Pushes a crate, too, but not beyond x = 3."""
+
+    names_of_objects = ("box", "crate")
+
     def __init__(self):
-        self.owner = Owner()
+        self.used = []
+        super().__init__(choice=self)
+
+    def check_other(self, item, goal):
+        if goal[0] > 3.0:
+            raise GoalRefused(JobError.GOAL_OCCUPIED, f"no room for the {item}")
+
+    def use(self, item):
+        assert not self.busy
+        self.used.append(item)
+
+
+class Client:
+    def __init__(self, owner=None):
+        self.owner = owner or Owner()
         self.node = rclpy.create_node("client")
         self.states = []
         self.node.create_subscription(JobState, "/red/job_state", self.states.append, LATCHED)
@@ -210,3 +228,33 @@ def test_another_object_a_plan_that_waits_and_cancel(client):
     assert client.result(answer)[1].error_code == JobError.CANCELED
     called = cancel.call_async(Trigger.Request())
     assert client.spinner.until(called.done, 15.0) and not called.result().success
+
+
+def test_a_goal_of_another_object_where_the_owner_has_a_choice(ros):
+    client = Client(Choice())
+    owner = client.owner
+    client.publish(GOAL)
+    assert owner.busy and owner.used == [] and client.state.object == "box"
+    _, result = client.result(client.send([4.0, 0.0, 0.0], item="crate"))
+    assert result.error_code == JobError.GOAL_OCCUPIED and owner.busy and owner.used == []
+    answer = client.send(GOAL, item="crate")  # the same pose, but of another object
+    assert client.spinner.until(lambda: owner.used == ["crate"], 15.0)
+    assert client.spinner.until(lambda: client.state.object == "crate", 15.0)
+    assert len(owner.taken) == 2 and client.state.job == 2
+    client.publish(np.array([2.0, 0.0, 0.0]))  # on the topic, a goal is of the first object
+    assert client.spinner.until(lambda: owner.used == ["crate", "box"], 15.0)
+    assert client.result(answer)[1].error_code == JobError.PREEMPTED
+    assert len(owner.taken) == 3 and client.spinner.until(
+        lambda: client.state.object == "box" and client.state.job == 3, 15.0
+    )
+    client.spinner.close()
+
+
+def test_a_plan_that_is_not_to_be_executed_is_refused_where_nobody_can_make_it(ros):
+    client = Client(Owner(no_plan_only="it plans as it goes"))
+    client.publish(GOAL)
+    _, result = client.result(client.send([2.0, 0.0, 0.0], plan_only=True))
+    assert result.error_code == JobError.INVALID_GOAL and result.error_msg == "it plans as it goes"
+    assert client.spinner.until(lambda: client.state.refusals == 1, 15.0)
+    assert client.owner.busy and len(client.owner.taken) == 1  # the job goes on
+    client.spinner.close()
