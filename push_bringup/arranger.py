@@ -94,7 +94,7 @@ class Arranger:
 
         timeout: [s] wall time. tell: called with a sentence for each new state.
         """
-        end, last = time.monotonic() + timeout, time.monotonic()
+        end, last, begun = time.monotonic() + timeout, time.monotonic(), False
         while time.monotonic() < end:
             self._spinner.until(lambda: bool(self._news), 0.5)
             if self._publisher.get_subscription_count():
@@ -105,8 +105,12 @@ class Arranger:
                 state = self._news.pop(0)
                 if state.refusals > self._refusals:
                     return JobError(state.refusal_code).name, str(state.refusal)
-                if state.job == self._jobs:
+                if state.job <= self._jobs:
+                    if begun or state.job < self._jobs:
+                        text = "the rearranger was restarted; send the goals again"
+                        return JobError.JOB_FORGOTTEN.name, text
                     continue
+                begun = True
                 if state.job > self._jobs + 1:
                     return JobError.PREEMPTED.name, "other goals have replaced these"
                 step = f" ({state.step_index + 1} of {state.step_count})"

@@ -1,6 +1,11 @@
 """The rearranger among the other nodes: two boxes, and everything that can happen meanwhile."""
 
 import math
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -200,3 +205,45 @@ def test_a_slice_of_the_study(name):
         row = trial(RearrangeTask(name, 102, "mild", world))
         assert row["success"], row
         assert row["moved_aside"] == (name == "relopush-6")
+
+
+@pytest.mark.live
+@pytest.mark.long
+def test_the_verb_follows_refusals_moves_and_a_node_that_dies(tmp_path):
+    """Live: goals of the scenario, goals that are refused, and a rearranger killed in mid-job."""
+    from push_bringup.arranger import Arranger
+
+    with own_domain() as domain:
+        environment = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
+        words = [sys.executable, "-m", "planar_push"]
+        (tmp_path / "two.yaml").write_text(two().text)
+        scenario = ["--scenario", str(tmp_path / "two.yaml")]
+        launch = subprocess.Popen(
+            [*words, "launch", "rearrange", "--respawn", *scenario], env=environment
+        )
+        try:
+            with Arranger() as arranger:
+                assert arranger.connect(60.0)
+                assert arranger.arrangement()["a"] == pytest.approx((0.0, 0.3, 0.0))
+                arranger.send({"a": (9.0, 0.0, 0.0)})
+                assert arranger.follow(20.0, print)[0] == "OUTSIDE_MAP"
+                told = []
+                arranger.send(arranger.arrangement())
+                assert arranger.follow(120.0, told.append) == ("", "every object is at its goal")
+                assert any("(1 of 2)" in text for text in told)
+                arranger.send({"b": (0.6, -0.3, 0.0)})
+
+                def kill(text):
+                    if text.startswith("'b'"):
+                        os.kill(child(launch.pid, "rearranger"), signal.SIGKILL)
+
+                assert arranger.follow(60.0, kill)[0] in ("JOB_FORGOTTEN", "NODE_LOST")
+        finally:
+            launch.send_signal(signal.SIGINT)
+            assert launch.wait(30) == 0
+
+
+def child(parent, word):
+    """The process id of a child process whose command line has a word."""
+    children = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
+    return next(int(p) for p in children if word in Path(f"/proc/{p}/cmdline").read_text())
