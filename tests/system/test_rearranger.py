@@ -3,8 +3,6 @@
 import math
 import os
 import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +21,7 @@ from push_ros.qos import COMMAND
 from push_scenario.scenario import scenario_from_mapping
 from push_study.experiments.rearrange import RearrangeTask, Watch, run_rearrangement, trial
 from push_study.graph_run import LockstepRun
+from tests.system.processes import children_of, command
 
 GOALS = {"a": [0.0, 0.3, 0.0], "b": [0.3, -0.3, 0.0]}
 
@@ -214,13 +213,10 @@ def test_the_verb_follows_refusals_moves_and_a_node_that_dies(tmp_path):
     from push_bringup.arranger import Arranger
 
     with own_domain() as domain:
-        environment = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
-        words = [sys.executable, "-m", "planar_push"]
         (tmp_path / "two.yaml").write_text(two().text)
-        scenario = ["--scenario", str(tmp_path / "two.yaml")]
-        launch = subprocess.Popen(
-            [*words, "launch", "rearrange", "--respawn", *scenario], env=environment
-        )
+        scenario = ("--scenario", str(tmp_path / "two.yaml"))
+        environment = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
+        launch = command("launch", "rearrange", "--respawn", *scenario, env=environment)
         try:
             with Arranger() as arranger:
                 assert arranger.connect(60.0)
@@ -233,17 +229,18 @@ def test_the_verb_follows_refusals_moves_and_a_node_that_dies(tmp_path):
                 assert any("(1 of 2)" in text for text in told)
                 arranger.send({"b": (0.6, -0.3, 0.0)})
 
+                def node(word):
+                    """The process of a node, by a word of its command line."""
+                    lines = {
+                        p: Path(f"/proc/{p}/cmdline").read_text() for p in children_of(launch.pid)
+                    }
+                    return next(pid for pid, line in lines.items() if word in line)
+
                 def kill(text):
                     if text.startswith("'b'"):
-                        os.kill(child(launch.pid, "rearranger"), signal.SIGKILL)
+                        os.kill(node("rearranger"), signal.SIGKILL)
 
                 assert arranger.follow(60.0, kill)[0] in ("JOB_FORGOTTEN", "NODE_LOST")
         finally:
             launch.send_signal(signal.SIGINT)
             assert launch.wait(30) == 0
-
-
-def child(parent, word):
-    """The process id of a child process whose command line has a word."""
-    children = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
-    return next(int(p) for p in children if word in Path(f"/proc/{p}/cmdline").read_text())
