@@ -41,13 +41,15 @@ class RearrangementSettings:
         0.012,
         low=1e-4,
         high=1.0,
-        doc="Distance from its goal up to which an object is not moved (m).",
+        doc="An object counts as at its goal if it is at most this far from it (m), and if its heading "
+        "is within orientation_tolerance.",
     )
     orientation_tolerance: float = bounded(
         0.05,
         low=1e-4,
         high=3.2,
-        doc="Angle from its goal up to which an object is not moved (rad).",
+        doc="Greatest angle between the headings of an object and of its goal at which the object "
+        "counts as at its goal (rad).",
     )
     aside: tuple[float, ...] = bounded(
         (0.15, 0.25, 0.4, 0.6),
@@ -58,14 +60,15 @@ class RearrangementSettings:
         200,
         low=1,
         high=100000,
-        doc="Maximum number of moves for which pushes are planned until the search gives up.",
+        doc="Number of moves for which pushes are planned before the search gives up.",
     )
 
     max_failures: int = bounded(
         3,
         low=0,
         high=100,
-        doc="Number of moves that may fail, after each of which the moves are planned again.",
+        doc="How often the moves are planned again after a move has failed, or because an object is "
+        "not at its goal after the last move.",
     )
 
     def __post_init__(self) -> None:
@@ -147,8 +150,9 @@ class Rearrangement:
                 apart, least = self._apart(goals, one, two), self._reach[one] + self._reach[two]
                 if apart < least:
                     text = (
-                        f"the goals of '{one}' and '{two}' are {1e3 * apart:.0f} mm apart; plans "
-                        f"keep the circles around two objects apart, here {1e3 * least:.0f} mm"
+                        f"the goals of '{one}' and '{two}' are {1e3 * apart:.0f} mm apart; they must "
+                        f"be at least {1e3 * least:.0f} mm apart, so that the circles around the "
+                        "two objects do not overlap"
                     )
                     raise PlanningFailed(_OCCUPIED, text)
 
@@ -301,7 +305,7 @@ class Rearrangement:
         why = (
             f"none was found with {self.plans} planned moves (max_plans)"
             if spent
-            else "every order leaves an object without a plan, also with one moved aside"
+            else "in every order there is an object without a plan, even if others are moved aside"
         )
         raise PlanningFailed(PlanError.NO_PUSH_SEQUENCE, f"no order of pushes for {names}: {why}")
 
