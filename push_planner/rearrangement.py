@@ -41,8 +41,8 @@ class RearrangementSettings:
         0.012,
         low=1e-4,
         high=1.0,
-        doc="An object counts as at its goal if it is at most this far from it (m), and if its heading "
-        "is within orientation_tolerance.",
+        doc="An object counts as at its goal if it is at most this far from it (m), and if its "
+        "heading is within orientation_tolerance.",
     )
     orientation_tolerance: float = bounded(
         0.05,
@@ -67,8 +67,8 @@ class RearrangementSettings:
         3,
         low=0,
         high=100,
-        doc="How often the moves are planned again after a move has failed, or because an object is "
-        "not at its goal after the last move.",
+        doc="How often the moves are planned again after a move has failed, or because an object "
+        "is not at its goal after the last move.",
     )
 
     def __post_init__(self) -> None:
@@ -150,8 +150,8 @@ class Rearrangement:
                 apart, least = self._apart(goals, one, two), self._reach[one] + self._reach[two]
                 if apart < least:
                     text = (
-                        f"the goals of '{one}' and '{two}' are {1e3 * apart:.0f} mm apart; they must "
-                        f"be at least {1e3 * least:.0f} mm apart, so that the circles around the "
+                        f"the goals of '{one}' and '{two}' are {1e3 * apart:.0f} mm apart; they "
+                        f"must be at least {1e3 * least:.0f} mm apart, so that the circles around the "
                         "two objects do not overlap"
                     )
                     raise PlanningFailed(_OCCUPIED, text)
