@@ -151,8 +151,8 @@ class Rearrangement:
                 if apart < least:
                     text = (
                         f"the goals of '{one}' and '{two}' are {1e3 * apart:.0f} mm apart; they "
-                        f"must be at least {1e3 * least:.0f} mm apart, so that the circles around the "
-                        "two objects do not overlap"
+                        f"must be at least {1e3 * least:.0f} mm apart, so that the circles around "
+                        "the two objects do not overlap"
                     )
                     raise PlanningFailed(_OCCUPIED, text)
 
