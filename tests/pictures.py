@@ -65,8 +65,27 @@ def main(images: Path = IMAGES) -> int:
                 shoot(bags, images / name, fraction)
             else:
                 failed += 1
+        failed += not several_objects(images, Path(folder))
         shoot_live(images / "view.png", Path(folder))
     return int(failed > 0)
+
+
+def several_objects(images: Path, folder: Path) -> bool:
+    """The run of the scenario ``rearrange``, its whole path and moving; whether it succeeded."""
+    bag, report = folder / "rearrange", folder / "report"
+    script = (
+        "from pathlib import Path; from push_scenario.scenario import load_scenario; "
+        "from push_study.experiments.rearrange import run_rearrangement; "
+        f"row = run_rearrangement(load_scenario('rearrange'), record=Path({str(bag)!r})); "
+        "raise SystemExit(not row['success'])"
+    )
+    words = ["-m", "planar_push", "report", str(bag), "--out", str(report)]
+    for arguments in (["-c", script], words):
+        if subprocess.run([sys.executable, *arguments], check=False).returncode:
+            return False
+    shutil.copy(report / "trajectory.png", images / "rearrange.png")
+    film(bag, images / "rearrange.gif")
+    return True
 
 
 def shoot_live(picture: Path, folder: Path) -> None:

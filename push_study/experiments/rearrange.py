@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -119,8 +120,13 @@ def trial(task: RearrangeTask) -> Row:
     }
 
 
-def run_rearrangement(believed: Scenario, world: Scenario | None = None) -> Row:
-    """The arrangement of a scenario, in lockstep: how it ended, from ground truth."""
+def run_rearrangement(
+    believed: Scenario, world: Scenario | None = None, record: Path | None = None
+) -> Row:
+    """The arrangement of a scenario, in lockstep: how it ended, from ground truth.
+
+    world: what is simulated, where that is something else. record: folder of a bag.
+    """
     watches: list[Watch] = []
 
     def watch() -> list[Node]:
@@ -129,7 +135,7 @@ def run_rearrangement(believed: Scenario, world: Scenario | None = None) -> Row:
 
     with (
         own_domain(),
-        LockstepRun(believed, watch, world, quiet=True, system="rearrange") as run,
+        LockstepRun(believed, watch, world, quiet=True, system="rearrange", record=record) as run,
     ):
         run.start()
         seen = watches[0]

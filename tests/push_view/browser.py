@@ -20,6 +20,11 @@ class Browser:
         there_in, here_out = os.pipe()
         ends = [fcntl.fcntl(fd, fcntl.F_DUPFD, 10) for fd in (there_in, there_out)]
 
+        # Nothing of this process, nor of Popen, may be called 3 or 4 when the child takes them.
+        taken = [os.open(os.devnull, os.O_RDONLY)]
+        while taken[-1] < 5:
+            taken.append(os.open(os.devnull, os.O_RDONLY))
+
         def connect():
             os.dup2(ends[0], 3)
             os.dup2(ends[1], 4)
@@ -35,7 +40,7 @@ class Browser:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
-        for fd in (there_in, there_out, *ends):
+        for fd in (there_in, there_out, *ends, *taken):
             os.close(fd)
         self._in, self._out = os.fdopen(here_in, "rb"), os.fdopen(here_out, "wb")
         self._buffer = b""
