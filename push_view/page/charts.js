@@ -1,5 +1,7 @@
 // Charts of what a team reports, over the time of the simulation: a chart for each unit.
 
+import {tickText} from "./model.js";
+
 const HEIGHT = 150, MOST = 8, LINES = 6, GAP = 1.0;   // [px], charts, lines of a chart, [s] without a line
 const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#b8860b"];
 const SCALES = {m: ["mm", 1e3], s: ["ms", 1e3]};
@@ -74,7 +76,7 @@ export class Charts {
     box.className = "chart";
     this.host.append(box);
     const grid = {stroke: "#8884", width: 1};
-    const axis = {stroke: ink, grid, ticks: grid, font: "11px system-ui", size: 46, values: (_, ticks) => ticks.map(v => v === null ? "" : String(Number(v.toPrecision(6))))};
+    const axis = {stroke: ink, grid, ticks: grid, font: "11px system-ui", size: 46, values: (_, ticks) => ticks.map(v => v === null ? "" : tickText(v))};
     const options = {
       title: title.startsWith("in ") ? `in ${unit}` : unit ? `${title} [${unit}]` : title, width: 300, height: HEIGHT,
       scales: {x: {time: false, range: (_, low, high) => this.range ?? [low ?? 0, high ?? 1]}, y: {range: (_, low, high) => span(low, high)}}, axes: [{...axis, size: 24}, axis], cursor: {sync: {key: "charts"}, drag: {setScale: false}},

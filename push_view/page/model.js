@@ -22,6 +22,19 @@ const teamOf = (model, space) => {
   return model.teams.get(space);
 };
 
+const EPOCH = 1e8;   // [s] a longer time is that of a lab's clock, since 1970
+const two = value => String(value).padStart(2, "0");
+
+// A time [s] as text: seconds of a simulation, or the time of day in a lab.
+export function timeText(t, digits = 1) {
+  if (t < EPOCH) return `${t.toFixed(digits)} s`;
+  const date = new Date(1e3 * t), seconds = (date.getSeconds() + date.getMilliseconds() / 1e3).toFixed(1);
+  return `${two(date.getHours())}:${two(date.getMinutes())}:${seconds.padStart(4, "0")}`;
+}
+
+// A number on an axis, with as many digits as tell it from its neighbours.
+export const tickText = v => v >= EPOCH ? timeText(v).slice(0, 8) : String(Number(v.toPrecision(6)));
+
 export const turn = a => Math.abs(Math.atan2(Math.sin(a), Math.cos(a)));
 
 // Distance [m] and angle [rad] of a team's object from its goal; null without either.

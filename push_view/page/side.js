@@ -1,6 +1,6 @@
 // The text and numbers beside the map.
 
-import {answerTo, busy, errorOf} from "./model.js";
+import {answerTo, busy, errorOf, timeText} from "./model.js";
 import {teamColor} from "./scene.js";
 
 const at = id => document.getElementById(id);
@@ -25,7 +25,7 @@ export const teamName = space => space.split("/").filter(Boolean).at(-1) ?? "all
 function numbers(model, team) {
   const state = team?.state, error = errorOf(model, team);
   const gap = error ? `${(1e3 * error[0]).toFixed(1)} mm, ${error[1].toFixed(3)} rad` : "–";
-  const rows = [["time", model.time === null ? "–" : `${model.time.toFixed(1)} s`]];
+  const rows = [["time", model.time === null ? "–" : timeText(model.time)]];
   if (model.bodies) {
     const robots = model.bodies.type.filter(t => model.bodies.types[t].robot).length, all = model.bodies.names.length;
     rows.push(["robots, objects", `${robots}, ${all - robots}`]);
@@ -86,7 +86,7 @@ export function showSide(model, chosen, sent, trouble, jump) {
   fill("log", log, () => log.toReversed().map(([t, name, reason]) => {
     const row = document.createElement("button"), text = document.createElement("p");
     text.append(element("b", `${name.toLowerCase()} `), reason);
-    row.append(element("span", `${t.toFixed(1)} s`), text);
+    row.append(element("span", timeText(t)), text);
     row.title = "show this moment in the charts"; row.onclick = () => jump(t);
     return row;
   }));

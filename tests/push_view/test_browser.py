@@ -229,6 +229,16 @@ def test_errors_of_the_object_and_of_a_method_are_two_lines(shown):
     assert (kind, text) == ("refused", "leave it unset")
 
 
+def test_times_of_a_lab_are_times_of_day(shown):
+    seconds, hours, tick, small = shown.value(
+        MODULES
+        + """
+        const t = new Date(2026, 10, 24, 9, 5, 3, 250).getTime() / 1e3;
+        return [m.timeText(12.345), m.timeText(t), m.tickText(t), m.tickText(0.0005)]; })()"""
+    )
+    assert (seconds, hours, tick, small) == ("12.3 s", "09:05:03.3", "09:05:03", "0.0005")
+
+
 def test_what_counts_as_silence(shown):
     """The page's own judgement, with a clock passed in."""
     assert shown.value(
