@@ -5,6 +5,7 @@ import time
 import pytest
 
 from push_bringup.background_suite import BackgroundSuite
+from push_bringup.failures import DomainInUse
 from tests.system.processes import children_of, running
 
 
@@ -27,6 +28,16 @@ def suite():
 def test_what_cannot_be_started_is_refused_and_says_why(suite, system, scenario, why):
     with pytest.raises(ValueError, match=why):
         suite.start(system, scenario)
+    assert suite.options()["running"] == "" and not children_of_this()
+
+
+def test_a_suite_beside_another_one_is_refused_in_words(suite, monkeypatch):
+    def busy(namespace):
+        raise DomainInUse("a bridge already runs in domain 7; stop it")
+
+    monkeypatch.setattr("push_bringup.background_suite.check_domain", busy)
+    with pytest.raises(ValueError, match="a bridge already runs in domain 7"):
+        suite.start("single", "short")
     assert suite.options()["running"] == "" and not children_of_this()
 
 

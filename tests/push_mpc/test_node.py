@@ -12,10 +12,10 @@ from rclpy.action import ActionClient
 from push_model import line, unicycle_step
 from push_mpc.node import ControllerNode
 from push_msgs.action import FollowTrajectory
-from push_msgs.msg import Poses
+from push_msgs.msg import Poses, Report
 from push_ros.conversions import poses_to_ros, time_from_ros, trajectory_to_ros
 from push_ros.process import Spinner
-from push_ros.qos import COMMAND, STREAM
+from push_ros.qos import COMMAND, STATUS, STREAM
 from push_scenario.scenario import scenario_from_mapping
 
 WORLD = yaml.safe_load("""
@@ -118,3 +118,23 @@ def test_an_unknown_object_is_refused(course):
     sent = course.client.send_goal_async(goal)
     assert course.spinner.until(sent.done, 15.0)
     assert not sent.result().accepted
+
+
+def test_it_reports_again_after_the_clock_went_back(course):
+    """A reset of the world, and the next trajectory: its reports come from its first tick on."""
+    reports = []
+    course.node.create_subscription(Report, "/me/report", reports.append, STATUS)
+    counts = []
+    for _ in range(2):
+        course.step()
+        course.follow()
+        reports.clear()
+        for _ in range(40):
+            course.step()
+        assert course.spinner.until(lambda: bool(reports), 5.0)
+        counts.append(len(reports))
+        course.tick = 5  # the world was reset
+        course.poses["me"] = np.array([-1.0, 0.0, 0.0])
+        for _ in range(3):
+            course.step()
+    assert counts[1] >= counts[0] - 2, counts
