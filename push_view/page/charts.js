@@ -49,7 +49,8 @@ export class Charts {
     this.marks = marks; this.cursor = cursor;
     const charts = grouped(all), ink = getComputedStyle(this.host).color;
     const times = [...charts.values()].flat().flatMap(l => l.t.length ? [l.t[0], l.t.at(-1)] : []);
-    this.range = times.length ? [Math.min(...times), Math.max(...times)] : null;   // the same in all charts
+    const first = Math.min(...times), last = Math.max(...times);
+    this.range = last > first ? [first, last] : null;   // the same in all charts; uPlot needs a width
     for (const title of this.plots.keys()) if (!charts.has(title)) this.drop(title);
     for (const [title, lines] of charts) {
       const key = [ink, ...lines.map(l => l.name)].join("|"), old = this.plots.get(title);
@@ -79,7 +80,7 @@ export class Charts {
     const axis = {stroke: ink, grid, ticks: grid, font: "11px system-ui", size: 46, values: (_, ticks) => ticks.map(v => v === null ? "" : tickText(v))};
     const options = {
       title: title.startsWith("in ") ? `in ${unit}` : unit ? `${title} [${unit}]` : title, width: 300, height: HEIGHT,
-      scales: {x: {time: false, range: (_, low, high) => this.range ?? [low ?? 0, high ?? 1]}, y: {range: (_, low, high) => span(low, high)}}, axes: [{...axis, size: 24}, axis], cursor: {sync: {key: "charts"}, drag: {setScale: false}},
+      scales: {x: {time: false, range: (_, low, high) => this.range ?? (high > low ? [low, high] : [(low ?? 0) - 0.5, (low ?? 0) + 0.5])}, y: {range: (_, low, high) => span(low, high)}}, axes: [{...axis, size: 24}, axis], cursor: {sync: {key: "charts"}, drag: {setScale: false}},
       series: [{label: "s", value: (_, v) => v?.toFixed(2) ?? "–"}, ...lines.map(({name}, i) => ({
         label: name, stroke: COLOURS[i % COLOURS.length], width: 1.5, dash: i > 2 ? [6, 3] : [], points: {show: false},
         value: (_, v) => v === null || v === undefined ? "–" : Number(v.toPrecision(4))}))],

@@ -229,6 +229,22 @@ def test_errors_of_the_object_and_of_a_method_are_two_lines(shown):
     assert (kind, text) == ("refused", "leave it unset")
 
 
+def test_a_chart_of_one_moment_is_drawn(shown):
+    """All charts have one time axis, which has no width yet when the first value comes."""
+    drawn = shown.value(
+        """(async () => {
+        const {Charts} = await import('/charts.js'), host = document.createElement('div');
+        document.body.append(host);
+        const charts = new Charts(host, () => {}), line = t => [["", new Map([["a",
+          {unit: "m", limit: undefined, t, v: t.map(() => 1)}]])]];
+        for (const t of [[5], [5, 6], []]) charts.show(line(t), [], null);
+        await new Promise(requestAnimationFrame);
+        const count = host.querySelectorAll("canvas").length;
+        host.remove(); return count; })()"""
+    )
+    assert drawn == 1 and shown.browser.errors == []
+
+
 def test_times_of_a_lab_are_times_of_day(shown):
     seconds, hours, tick, small = shown.value(
         MODULES
