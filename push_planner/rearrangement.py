@@ -305,7 +305,7 @@ class Rearrangement:
         why = (
             f"none was found with {self.plans} planned moves (max_plans)"
             if spent
-            else "in every order there is an object without a plan, even if one other is moved aside"
+            else "in every order there is an object without a plan, even with one moved aside"
         )
         raise PlanningFailed(PlanError.NO_PUSH_SEQUENCE, f"no order of pushes for {names}: {why}")
 
