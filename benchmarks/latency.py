@@ -1,10 +1,15 @@
-"""From poses to command across processes at 100 Hz, the controller following a trajectory; alone,
-and with two pages of the live view open."""
+"""From poses to command across processes at 100 Hz, the controller following a trajectory: alone,
+with two readers of what a page reads, and with two pages in browsers on the same cores."""
 
+import os
+import shutil
+import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import time
+from collections.abc import Sequence
 from contextlib import ExitStack
 from typing import Any
 
@@ -28,6 +33,7 @@ from push_ros.qos import COMMAND, STREAM
 from push_scenario.scenario import load_scenario
 
 _PAGES = 2
+_LOADING, _ENDING = 4.0, 5.0  # [s] for a browser
 _READER = "import sys, urllib.request as r\nfor _ in r.urlopen(sys.argv[1], timeout=60): pass"
 
 
@@ -51,17 +57,18 @@ def run(seconds: float = 15.0) -> dict[str, Any]:
         stack.callback(second.stop)
         second.start()
         course.follow(0.0)  # until the viewer is there
-        for _ in range(_PAGES):
-            stack.callback(_open(port).kill)
-        shown = _summary(f"{_PAGES} pages open", course.follow(seconds), course)
-    ratio = shown["p99_ms"] / alone["p99_ms"]
-    print(f"  p99 with pages over p99 alone: {ratio:.2f}")
-    return {
-        **alone,
-        "pages": shown,
-        "p99_ratio": ratio,
-        "bounds": {"p99 [ms]": at_most(alone["p99_ms"], 8.0)},
-    }
+        beside = {"readers": _beside("readers", [_reader(port)] * _PAGES, course, seconds)}
+        browser = shutil.which("chromium") or shutil.which("chromium-browser")
+        if browser is None:
+            print("  no Chromium is installed: browsers are not measured")
+        else:
+            profiles = [stack.enter_context(tempfile.TemporaryDirectory()) for _ in range(_PAGES)]
+            words = [_browser(browser, port, profile) for profile in profiles]
+            beside["browsers"] = _beside("browsers", words, course, seconds)
+    for name, row in beside.items():
+        row["p99_ratio"] = row["p99_ms"] / alone["p99_ms"]
+        print(f"  p99 with {_PAGES} {name} over p99 alone: {row['p99_ratio']:.2f}")
+    return {**alone, **beside, "bounds": {"p99 [ms]": at_most(alone["p99_ms"], 8.0)}}
 
 
 class _Course:
@@ -123,15 +130,43 @@ def _free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def _open(port: int) -> "subprocess.Popen[bytes]":
-    """A reader of the stream that a page reads."""
-    address = f"http://127.0.0.1:{port}/events"
-    return subprocess.Popen(
-        [sys.executable, "-c", _READER, address],
-        preexec_fn=die_with_parent,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
+def _reader(port: int) -> list[str]:
+    return [sys.executable, "-c", _READER, f"http://127.0.0.1:{port}/events"]
+
+
+def _browser(browser: str, port: int, profile: str) -> list[str]:
+    quiet = ["--headless", "--no-sandbox", "--disable-gpu", "--no-first-run"]
+    quiet += ["--disable-background-networking", "--remote-debugging-port=0"]
+    return [browser, *quiet, f"--user-data-dir={profile}", f"http://127.0.0.1:{port}/"]
+
+
+def _beside(
+    name: str, commands: Sequence[list[str]], course: _Course, seconds: float
+) -> dict[str, Any]:
+    """The delays while processes run that show the page."""
+    quiet = subprocess.DEVNULL
+    running = [
+        subprocess.Popen(
+            words,
+            preexec_fn=die_with_parent,
+            start_new_session=True,
+            stdin=quiet,
+            stdout=quiet,
+            stderr=quiet,
+        )
+        for words in commands
+    ]
+    try:
+        course.follow(_LOADING)
+        return _summary(f"{len(running)} {name}", course.follow(seconds), course)
+    finally:
+        for process in running:
+            process.terminate()  # a browser ends its own processes
+            try:
+                process.wait(_ENDING)
+            except subprocess.TimeoutExpired:
+                os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
 
 
 def _summary(label: str, delays: list[float], course: _Course) -> dict[str, Any]:

@@ -7,8 +7,9 @@ under which the server is really reached, and the request must not come from ano
 - ``localhost``, the host that the server was told to bind, and addresses written as numbers
   (``127.0.0.1``, ``192.168.1.7``, ``[::1]``) are accepted, because a foreign name cannot be one.
   A server bound to one address accepts only that one and the loopback's.
-- A server bound to all addresses (``0.0.0.0``, ``::``) accepts every numeric address and the host
-  name of the machine, but no other name.
+- A server bound to all addresses (``0.0.0.0``, ``::``) accepts every numeric address, the host name
+  of the machine, and that name with ``.local``, under which the local network finds it (multicast
+  DNS, RFC 6762; a name server outside cannot give it an address). It accepts no other name.
 - The port is ignored, because a tunnel may forward another one.
 - ``Origin``, if a browser sends it, must be that host and port. ``Sec-Fetch-Site`` must not name
   another site, except for the page itself, to which anybody may link.
@@ -63,7 +64,8 @@ class WhoMayAsk:
         if not name:
             return False
         if self.everywhere:
-            return name in (*_LOOPBACK, self.own_name.lower()) or _is_address(name)
+            own = self.own_name.lower().removesuffix(".local")
+            return name in (*_LOOPBACK, own, f"{own}.local") or _is_address(name)
         return name in (*_LOOPBACK, self.bound.lower().strip("[]"))
 
     def refusal(self, headers: Message, *, page: bool = False, acts: bool = False) -> str:

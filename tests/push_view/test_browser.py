@@ -15,6 +15,9 @@ from tests.push_view.page_client import Page, Suite
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here")
 
 
+_BOX = "document.getElementById('{}').getBoundingClientRect()"
+
+
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory):
     browser = Browser(tmp_path_factory.mktemp("profile"))
@@ -120,6 +123,35 @@ def test_nothing_lies_over_the_map(shown):
     for u in (f"{box}.left + 20", f"{box}.right - 20"):
         for v in (f"{box}.top + 20", f"{box}.bottom - 20"):
             assert shown.value(f"document.elementFromPoint({u}, {v}).id") == "scene", (u, v)
+
+
+@pytest.mark.parametrize("size", [(1200, 320), (390, 500)])
+def test_the_tools_stay_in_sight(shown, size):
+    """However far the page is scrolled, at a desk and on a phone."""
+    try:
+        shown.page.away(lambda: shown.browser.resize(*size))
+        scroller = "(innerWidth > 800 ? document.querySelector('main') : document.scrollingElement)"
+        shown.until(f"{scroller}.scrollHeight > {scroller}.clientHeight + 40")
+        shown.value(f"{scroller}.scrollTop = 1e5")
+        shown.until(f"{scroller}.scrollTop > 30")
+        for name in ("pause", "reset", "theme"):
+            middle = f"(b => [b.x + b.width / 2, b.y + b.height / 2])({_BOX.format(name)})"
+            hit = f"(([x, y]) => document.elementFromPoint(x, y)?.id)({middle})"
+            shown.until(f"{hit} === '{name}'", 3.0)
+    finally:
+        shown.page.away(lambda: shown.browser.resize(1200, 760))
+
+
+def test_light_and_dark_are_remembered(shown):
+    dark = "getComputedStyle(document.body).backgroundColor === 'rgb(20, 23, 28)'"
+    before = shown.value(dark)
+    shown.value("document.getElementById('theme').click()")
+    assert shown.value(dark) is not before
+    shown.page.away(lambda: shown.browser.open(f"http://127.0.0.1:{shown.page.server.port}/?again"))
+    shown.until(f"document.readyState === 'complete' && ({dark}) === {str(not before).lower()}")
+    shown.value("document.getElementById('theme').click()")
+    assert shown.value(dark) is before
+    shown.value("localStorage.clear()")
 
 
 def test_the_page_tells_what_became_of_its_own_goal(shown):

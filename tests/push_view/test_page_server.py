@@ -94,6 +94,11 @@ def test_the_rule():
                 rule.knows(n + port) for n in ("localhost", "LOCALHOST", "127.0.0.1", "[::1]")
             )
         assert everywhere.knows(f"lab-7{port}") and everywhere.knows(f"LAB-7{port}")
+        assert everywhere.knows(f"lab-7.local{port}") and everywhere.knows(f"Lab-7.local.{port}")
+        assert WhoMayAsk("::", "mac.local").knows(f"mac.local{port}")
+        for foreign in (f"x{letters}.local", "lab-7.local.example", "lab-7.local.local"):
+            assert not everywhere.knows(foreign + port)
+        assert not local.knows(f"lab-7.local{port}") and not one.knows(f"lab-7.local{port}")
         assert one.knows(f"192.168.1.7{port}")
     for nonsense in (
         "",

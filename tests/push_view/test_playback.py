@@ -118,6 +118,13 @@ def test_two_bags_side_by_side_in_a_browser(scenario, tmp_path):
         wait(browser, "document.getElementById('now').textContent.startsWith('2.02')")
         browser.value("document.getElementById('go').click()")
         wait(browser, "parseFloat(document.getElementById('now').textContent) > 2.5")
+        browser.key(" ")  # pause
+        wait(browser, "document.getElementById('go').textContent === '▶'")
+        time_shown = "parseFloat(document.getElementById('now').textContent)"
+        browser.value(seek(4.0))
+        for key, expected in (("ArrowRight", 4.02), ("ArrowRight", 4.04), ("ArrowLeft", 4.02)):
+            browser.key(key)
+            wait(browser, f"{time_shown} === {expected}")
         assert browser.errors == []
     finally:
         browser.close()
