@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from grasp_opt.contact_outline import Contacts
-from grasp_opt.wrench_cone import margin, task_wrenches, wrench_rays
+from grasp_opt.wrench_cone import task_wrenches, wrench_margins, wrench_rays
 from push_model.arrays import Array
 from push_model.settings import SettingsError
 from push_model.specs import ObjectSpec
@@ -33,6 +33,7 @@ class GraspCertificate:
     def __init__(self, item: ObjectSpec, believed: ContactBelief, twists: Array) -> None:
         """twists: ``(m, 3)`` [m/s, m/s, rad/s] of the centre of mass of ``item``, object frame."""
         self._friction = believed.friction.low
+        self._count = int(np.any(twists != 0.0, axis=1).sum())
         self._cases: list[tuple[Array, float, Array]] = []
         self._loss = 0.0 if believed.com_x.width == believed.com_y.width == 0.0 else BEND
         self.possible = True
@@ -49,15 +50,18 @@ class GraspCertificate:
 
     def margin(self, contacts: Contacts) -> float:
         """The certified margin; -1 if there is none."""
+        return float(self.margins(contacts).min(initial=1.0)) if self.possible else -1.0
+
+    def margins(self, contacts: Contacts) -> Array:
+        """The certified margin at each of the twists that are not zero ``(q,)``."""
         if not self.possible:
-            return -1.0
-        return (
-            min(
-                margin(
-                    wrench_rays(contacts.points - shift, contacts.normals, self._friction, radius),
-                    wrenches,
-                )
-                for shift, radius, wrenches in self._cases
+            return np.full(self._count, -1.0)
+        found = [
+            wrench_margins(
+                wrench_rays(contacts.points - shift, contacts.normals, self._friction, radius),
+                wrenches,
             )
-            - self._loss
-        )
+            for shift, radius, wrenches in self._cases
+        ]
+        least: Array = np.min(found, axis=0) - self._loss
+        return least

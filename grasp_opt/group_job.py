@@ -5,6 +5,7 @@ and back off; then the next one. What goes wrong in a step is met by planning th
 that does not move although it is told to is left where it is, and the others go on without it.
 """
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,12 +17,14 @@ from grasp_opt.job_state import MoveWatch, Step, Tally, Task
 from grasp_opt.moves import Mover, MoveSettings, back_off
 from grasp_opt.object_trajectory import ObjectTrajectory
 from grasp_opt.prediction import GroupPrediction
+from grasp_opt.slip_watch import SlipWatch
 from grasp_opt.step_planner import GroupPlan
 from push_model import se2
 from push_model.arrays import Array
 from push_model.jobs import JobError, JobPhase
 from push_model.settings import bounded, settings
 from push_model.specs import ObjectSpec, RobotSpec
+from push_model.stick_certificate import ContactBelief
 
 
 @settings
@@ -68,6 +71,16 @@ class Request:
     trajectory: ObjectTrajectory | None = None
     fewest: int = 0
 
+    def about(self, point: Array) -> "Request":
+        """See ``Task.about``."""
+        off = np.array([*point, 0.0])
+        return replace(
+            self,
+            pose=se2.compose(self.pose, off),
+            goal=se2.compose(self.goal, off),
+            trajectory=self.trajectory and self.trajectory.about(point),
+        )
+
 
 class GroupJob:
     """One job at a time of ``count`` robots of one type.
@@ -90,6 +103,7 @@ class GroupJob:
         """item, robot: as believed."""
         self.settings = s = settings or GroupJobSettings()
         self._item, self._robot, self._count = item, robot, count
+        self._believed: ContactBelief | None = None
         self._push_settings = push or GroupPushSettings()
         self._control, self._moves = control or GroupControlSettings(), moves or MoveSettings()
         self._outline = ContactOutline(item.geometry)
@@ -137,6 +151,21 @@ class GroupJob:
         return self._step.last
 
     @property
+    def watch(self) -> SlipWatch | None:
+        """What the belief says of the last step that was planned."""
+        return self._step.watch
+
+    @property
+    def slip_in(self) -> float:
+        """[s] until the contacts may no longer hold the object; inf as far as they do."""
+        step = self._step
+        return (
+            math.inf
+            if step.last is None or step.watch is None
+            else step.watch.ahead(step.last.time)
+        )
+
+    @property
     def pose_delay(self) -> float:
         """[s] from the measurement of a frame to the command that answers it; may change at any
         time."""
@@ -173,21 +202,33 @@ class GroupJob:
         """Believe in all robots again: the world was reset, or somebody saw to them."""
         self.dead = ()
 
-    def believe(self, item: ObjectSpec, robot: RobotSpec) -> None:
-        """Go on with another object and robot type than before; a push under way too."""
-        if item == self._item and robot == self._robot:
+    def believe(
+        self, item: ObjectSpec, robot: RobotSpec, believed: ContactBelief | None = None
+    ) -> None:
+        """Go on with another object and robot type than before; a push under way too. believed:
+        intervals of friction and centre of mass."""
+        if (item, robot, believed) == (self._item, self._robot, self._believed):
             return
-        self._item, self._robot = item, robot
+        moved = np.subtract(item.com, self._item.com)
+        self._item, self._robot, self._believed = item, robot, believed
+        if moved.any():
+            self._task.about(moved)
+            self._step.about(moved)
+            self.request = self.request and self.request.about(moved)
         self._outline = ContactOutline(item.geometry)
+        if self._step.watch is not None:
+            self._step.watch.believe(item, believed)
         if self._step.push is not None:
-            self._step.push.believe(item, robot)
+            self._step.push.believe(item, robot, moved)
 
     def planned(self, plan: GroupPlan) -> None:
         """The answer to a request."""
         if self.request is None:
             return
         self.request, self._tally.left = None, plan.left
-        self._step = Step(plan, Mover(plan.batches, self._robot.differential, self._moves))
+        watch = SlipWatch(plan.placement.contacts, plan.trajectory, self._item, self._believed)
+        mover = Mover(plan.batches, self._robot.differential, self._moves)
+        self._step = Step(plan, watch, mover)
         count = len(plan.pushers)
         self._enter(JobPhase.POSITIONING, f"{count} robots go to their places")
 
@@ -253,6 +294,24 @@ class GroupJob:
             return True
         self._lost(still, "robots did not reach their places in time" if late else "")
         return False
+
+    def _cut(self, now: float, time: float) -> bool:
+        """Whether the push ends at a time [s] of its trajectory, before the object may slip."""
+        left, s = self.slip_in, self._push_settings
+        if left > s.slip_warning or not s.stop_before_slip:
+            return False
+        self._watch.since = now
+        self._task.done_until(time, more=True)
+        self._tally.failed()
+        reason = (
+            f"the contacts may not hold the object in {left:.1f} s, for what is believed now: a "
+            "new plan is needed"
+        )
+        if self._tally.failures > self.settings.failures:
+            self.end(JobError.EXECUTION_FAILED, reason)
+        else:
+            self._enter(JobPhase.DETACHING, reason)
+        return True
 
     def _lost(self, dead: tuple[int, ...], reason: str) -> None:
         """A step went wrong."""
@@ -331,7 +390,7 @@ class GroupJob:
         if step.phase is Phase.PUSH and self.state is JobPhase.APPROACH:
             self._tally.pushes += 1
             self._enter(JobPhase.PUSHING, f"{len(pushers)} robots push")
-        elif step.phase is Phase.DONE:
+        if step.phase is Phase.DONE:
             self._tally.pushed()
             self._task.done_until(plan.trajectory.duration, more=self._tally.left > 0)
             self._watch.since = now
@@ -341,4 +400,6 @@ class GroupJob:
             # A robot that was only held fast moves when it backs off; one that does not is dead.
             self._tally.fewest = len(pushers) + 1
             self._lost((), step.reason)
+        else:
+            return 0.0 * twists if self._cut(now, step.time) else twists
         return twists

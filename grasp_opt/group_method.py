@@ -6,14 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from grasp_opt.grasp_certificate import GraspCertificate
 from grasp_opt.group_control import GroupControlSettings
 from grasp_opt.group_job import GroupJob, GroupJobSettings, Request
 from grasp_opt.group_push import GroupPushSettings
 from grasp_opt.moves import MoveSettings
 from grasp_opt.object_trajectory import ObjectTrajectory, sampled
 from grasp_opt.plan_source import InlinePlans, PlanFailed, PlanSource
-from grasp_opt.step_planner import GroupPlan
 from push_job.method import Arena, Certificate, MethodSpec, Refusal, Seen, Task, Told
 from push_job.report import Drawable, Figure, Report, Status, arrows, discs, polyline
 from push_model import se2
@@ -51,9 +49,6 @@ class GroupMethod:
             InlinePlans(arena.grid, arena.object, self._names[0]) if source is None else source
         )
         self._asked: Request | None = None
-        self._planned_for = arena.item  # as believed when the push under way was planned
-        self._believed: ContactBelief | None = None
-        self._known: tuple[GroupPlan, ContactBelief, float] | None = None  # of the last push
         self._finder = WayFinder(FreeSpace(arena.grid), arena.item.geometry.outline, 0.0)
         self.job = GroupJob(
             arena.item,
@@ -158,7 +153,6 @@ class GroupMethod:
             return self._plans.cost
         if plan is None:
             return 0.0
-        self._planned_for = self._item
         self.job.planned(plan)
         return self._plans.cost
 
@@ -182,8 +176,10 @@ class GroupMethod:
             Figure("heading error", abs(float(off[2])), "rad"),
             Figure("grasp margin", float(plan.placement.margin), "", 0.0),
         ]
-        if (believed := self._believed) is not None:
-            figures.insert(3, Figure("certified margin", self._certified(plan, believed), "", 0.0))
+        if job.watch is not None and job.watch.certified is not None:
+            figures.insert(3, Figure("certified margin", job.watch.certified, "", 0.0))
+        if math.isfinite(job.slip_in):
+            figures.insert(3, Figure("slip expected in", job.slip_in, "s"))
         command = step.command
         if command is not None:
             turn = se2.rotation_matrix(float(pose[2]))
@@ -197,15 +193,6 @@ class GroupMethod:
             wrench = turn @ command.wrench[:2]
             shapes.append(arrows("wrench", pose[None, :2], _PER_NEWTON * wrench[None]))
         return Report(step.phase.value, tuple(figures), tuple(shapes))
-
-    def _certified(self, plan: GroupPlan, believed: ContactBelief) -> float:
-        """The certified margin of the push under way; computed anew for a new plan or belief."""
-        known = self._known
-        if known is None or known[0] is not plan or known[1] != believed:
-            twists = plan.trajectory.body_twists
-            certificate = GraspCertificate(self._planned_for, believed, twists)
-            known = self._known = plan, believed, certificate.margin(plan.placement.contacts)
-        return known[2]
 
     def _cones(self, points: Array, normals: Array) -> list[Drawable]:
         half = math.atan(self._item.contact_friction)
@@ -260,8 +247,7 @@ class GroupMethod:
             space = FreeSpace(self._arena.grid)
             self._finder = WayFinder(space, item.geometry.outline, 0.0)
         self._item = item
-        self._believed = ContactBelief.of(belief, self._arena.object)
-        self.job.believe(item, robot)
+        self.job.believe(item, robot, ContactBelief.of(belief, self._arena.object))
         if (POSES, "latency") in belief.values:
             self.job.pose_delay = belief.latency.value
 

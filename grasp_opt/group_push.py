@@ -92,6 +92,18 @@ class GroupPushSettings:
         doc="Distance that a robot must be commanded to move within the time 'dead' before it "
         "is judged dead or alive (m).",
     )
+    slip_warning: float = bounded(
+        1.0,
+        low=0.0,
+        high=60.0,
+        doc="Time by which a push ends before the contacts may no longer hold the object, after "
+        "the belief has changed (s)",
+    )
+    stop_before_slip: bool = bounded(
+        True,
+        doc="Whether such a push ends, so that a new plan is made; otherwise there is only a "
+        "warning",
+    )
     position_noise: float = bounded(
         2e-4,
         low=1e-6,
@@ -184,8 +196,14 @@ class GroupPush:
         self.time = 0.0  # [s] along the trajectory
         self._moved_on = 0.0  # [s] when it last did
 
-    def believe(self, item: ObjectSpec, robot: RobotSpec) -> None:
-        """Push on with what is believed of the object and the robots now."""
+    def believe(self, item: ObjectSpec, robot: RobotSpec, moved: Array) -> None:
+        """Push on with what is believed of the object and the robots now.
+
+        moved: ``(2,)`` [m] by which the believed centre of mass has moved, object frame.
+        """
+        if moved.any():
+            self.trajectory = self.trajectory.about(moved)
+            self._filter.reset()
         self._drive = robot.differential
         before = self.controller
         self.controller = GroupController(

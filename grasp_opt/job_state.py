@@ -1,12 +1,16 @@
 """What a group's job remembers: its task, its count of pushes and failures, the step under way."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from grasp_opt.group_push import GroupPush, GroupStep
 from grasp_opt.moves import Mover
 from grasp_opt.object_trajectory import ObjectTrajectory
+from grasp_opt.slip_watch import SlipWatch
 from grasp_opt.step_planner import GroupPlan
 from push_estimation.actuation_monitor import ActuationMonitor
+from push_model import se2
 from push_model.arrays import Array
 
 
@@ -26,6 +30,14 @@ class Task:
     def over(self) -> bool:
         """Whether a trajectory was given and has been followed to its end."""
         return self.following and self.along is None
+
+    def about(self, point: Array) -> None:
+        """Tell it of another point ``(2,)`` [m] of the object: the centre of mass is believed to be
+        there."""
+        if self.goal is not None:
+            self.goal = se2.compose(self.goal, np.array([*point, 0.0]))
+        if self.along is not None:
+            self.along = self.along.about(point)
 
     def done_until(self, time: float, more: bool) -> None:
         """The trajectory was followed until a time [s]; more: whether a part of it is left."""
@@ -63,12 +75,19 @@ class Tally:
 
 @dataclass
 class Step:
-    """The step under way: its plan, the robots' moves, then the push and its last tick."""
+    """The step under way: its plan, what the belief says of it, the robots' moves, then the push
+    and its last tick."""
 
     plan: GroupPlan | None = None
+    watch: SlipWatch | None = None
     mover: Mover | None = None
     push: GroupPush | None = None
     last: GroupStep | None = None
+
+    def about(self, point: Array) -> None:
+        """See ``Task.about``."""
+        if self.plan is not None:
+            self.plan = replace(self.plan, trajectory=self.plan.trajectory.about(point))
 
 
 class MoveWatch:

@@ -58,6 +58,16 @@ class ObjectTrajectory:
         twist = np.array([self.twist_at(t) for t in time])
         return ObjectTrajectory(time - begin, pose, twist)
 
+    def about(self, point: Array) -> "ObjectTrajectory":
+        """The same motion of the object, told of another of its points ``(2,)`` [m], object
+        frame."""
+        c, s = np.cos(self.pose[:, 2]), np.sin(self.pose[:, 2])
+        arm = np.column_stack([c * point[0] - s * point[1], s * point[0] + c * point[1]])
+        pose, twist = self.pose.copy(), self.twist.copy()
+        pose[:, :2] += arm
+        twist[:, :2] += twist[:, 2:] * np.column_stack([-arm[:, 1], arm[:, 0]])
+        return ObjectTrajectory(self.time, pose, twist)
+
     def sample(self, t: float) -> Array:
         """Pose ``(3,)`` at a time [s]; at rest beyond the ends."""
         return np.array([np.interp(t, self.time, column) for column in self.pose.T])

@@ -112,26 +112,35 @@ def _in_plane(rays: Any, facets: Any, count: int) -> int:
 
 
 @numba.njit(cache=True)
-def _margin(rays: Any, wrenches: Any) -> float:
+def _each(rays: Any, wrenches: Any, result: Any) -> None:
+    """The margin of each wrench."""
     m = rays.shape[0]
     facets = np.empty((m * m + 2 * m + 2, 3))
     count, rank = _facets(rays, facets)
-    worst = 1.0
+    result[:] = 1.0
     if rank == 1:  # a single ray, or a line
         for i in range(wrenches.shape[0]):
             best = -1.0
             for k in range(m):
                 best = max(best, (wrenches[i] * rays[k]).sum())
-            worst = min(worst, min(0.0, -np.sqrt(max(0.0, 1.0 - best * best))))
-            if best < 0.0:
-                worst = -1.0
-        return 0.0 if worst > -1e-7 else worst
+            off = min(0.0, -np.sqrt(max(0.0, 1.0 - best * best))) if best >= 0.0 else -1.0
+            result[i] = 0.0 if off > -1e-7 else off
+        return
     if rank == 2:
         count = _in_plane(rays, facets, count)
     for i in range(wrenches.shape[0]):
         for k in range(count):
             d = facets[k, 0] * wrenches[i, 0] + facets[k, 1] * wrenches[i, 1]
-            worst = min(worst, d + facets[k, 2] * wrenches[i, 2])
+            result[i] = min(result[i], d + facets[k, 2] * wrenches[i, 2])
+
+
+@numba.njit(cache=True)
+def _margin(rays: Any, wrenches: Any) -> float:
+    result = np.empty(len(wrenches))
+    _each(rays, wrenches, result)
+    worst = 1.0
+    for i in range(len(result)):
+        worst = min(worst, result[i])
     return worst
 
 
@@ -151,6 +160,13 @@ def margin(rays: Array, wrenches: Array) -> float:
     not below ``-HELD``.
     """
     return float(_margin(np.ascontiguousarray(rays), np.ascontiguousarray(wrenches)))
+
+
+def wrench_margins(rays: Array, wrenches: Array) -> Array:
+    """``margin`` of each of the wrenches ``(q, 3)`` alone; ``(q,)``."""
+    result = np.empty(len(wrenches))
+    _each(np.ascontiguousarray(rays), np.ascontiguousarray(wrenches), result)
+    return result
 
 
 HELD = 1e-9

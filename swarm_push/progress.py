@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from push_model import se2
 from push_model.arrays import Array
 
 _CLOSER = 5e-3  # [m] that the object must come closer for it to count as progress
@@ -44,6 +45,12 @@ class TargetQueue:
         """The target that is pursued was moved."""
         moved = np.array(target, dtype=np.float64)
         self.poses = (*self.poses[: self.index], moved, *self.poses[self.index + 1 :])
+
+    def about(self, point: Array) -> None:
+        """Tell them of another point ``(2,)`` [m] of the object, where the centre of mass is
+        believed to be. Targets without a heading are places of the centre of mass itself."""
+        off = np.array([*point, 0.0])
+        self.poses = tuple(p if np.isnan(p[2]) else se2.compose(p, off) for p in self.poses)
 
     def advance(self, now: float) -> None:
         """The target that is pursued is reached at a time [s]."""

@@ -67,7 +67,7 @@ class SwarmJob:
             track = track or TrackSettings()
             self.track = ObjectTrack(walls.space.field, item.geometry.outline, self._radius, track)
         self._law = make_law(laws or LawSections(), region, item, self._radius, self._speed, walls)
-        self._outline = item.geometry.outline
+        self._outline, self._com = item.geometry.outline, item.com
         self._lever = float(np.hypot(*self._outline.T).max())
         self.state, self.reason, self.error = JobPhase.IDLE, "waiting for a goal", JobError.NONE
         self.last: SwarmStep | None = None
@@ -148,6 +148,9 @@ class SwarmJob:
     def retarget(self, target: Array) -> None:
         """The target that is pursued was moved."""
         self._queue.replace_current(target)
+        self._changed_target()
+
+    def _changed_target(self) -> None:
         self._arrival.restart()
         self._strengths.clear()
         self._progress.forget()
@@ -173,8 +176,13 @@ class SwarmJob:
 
     def believe(self, item: ObjectSpec) -> None:
         """Go on with what is believed of the object now. A way of the object that is under way is
-        kept; the next one is searched for the new outline."""
-        outline = item.geometry.outline
+        kept, unless it is that of another centre of mass; the next one is searched for the new
+        outline."""
+        outline, moved = item.geometry.outline, np.subtract(item.com, self._com)
+        self._com = item.com
+        if moved.any():
+            self._queue.about(moved)
+            self._changed_target()
         if not np.array_equal(outline, self._outline):
             self._outline = outline
             self._lever = float(np.hypot(*outline.T).max())

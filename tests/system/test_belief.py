@@ -1,5 +1,7 @@
 """``/belief``, published in mid-job, changes what every system does at its next step."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -104,12 +106,12 @@ def test_what_cannot_be_believed_is_refused_and_changes_nothing(single):
     assert message.source == "person"
 
 
-def group_scenario():
+def group_scenario(two=False):
     values = {
         "environment": "open",
         "robots": {
             f"e{i}": {"type": "epuck_ring", "start": [-0.9, y, 0.0]}
-            for i, y in enumerate((-0.4, 0.0, 0.4))
+            for i, y in enumerate((-0.2, 0.2) if two else (-0.4, 0.0, 0.4))
         },
         "objects": {"plate": {"type": "plate_ellipse", "start": [0.0, 0.0, 0.0]}},
         "parameters": {"bridge": {"world": "planar"}},
@@ -146,8 +148,80 @@ def test_a_group_is_placed_by_the_certified_margin_and_tells_it():
         assert report_from_ros(told[-1]).figure("certified margin") < sure
 
 
+@pytest.mark.long
+def test_a_group_ends_a_push_that_may_slip_and_plans_anew():
+    """A friction arrives in mid-push that the contacts do not hold the object with."""
+    scenario = group_scenario(two=True)
+    with LockstepRun(scenario, quiet=True, system="group") as run:
+        run.start()
+        told, seen = [], []
+        run.observer.create_subscription(Report, "/report", told.append, STATUS)
+        pushing(run, (0.5, 0.2, 0.6))
+        job = run.supervisor.method.job
+        before = job.watch.nominal
+        assert before > 0.0 and job.slip_in == np.inf
+        tell(run, {("plate", "contact_friction"): (0.02, 0.015, 0.025)})
+
+        def ended():
+            seen.append(run.observer.state.reason)
+            return run.teams[""].ended
+
+        assert run.spin_until(ended, 300.0)
+        why = [r for r in dict.fromkeys(seen) if "may not hold the object" in r]
+        assert len(why) == 1 and "for what is believed now" in why[0], dict.fromkeys(seen)
+        assert job.replans >= 1
+
+
+def test_a_group_that_is_not_to_stop_before_a_slip_only_tells_it():
+    scenario = group_scenario(two=True).settings("group", push__stop_before_slip=False)
+    with LockstepRun(scenario, quiet=True, system="group") as run:
+        run.start()
+        told = []
+        run.observer.create_subscription(Report, "/report", told.append, STATUS)
+        pushing(run, (0.5, 0.2, 0.6))
+        tell(run, {("plate", "contact_friction"): (0.02, 0.015, 0.025)})
+        begin = run.bridge.time
+        run.spin_until(lambda: run.bridge.time > begin + 0.5, 2.0)
+        assert report_from_ros(told[-1]).figure("slip expected in") >= 0.0
+        assert run.observer.state.state == JobState.PUSHING
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("when", [JobState.PLANNING, JobState.POSITIONING, JobState.PUSHING])
+def test_a_group_brings_the_object_to_its_goal_when_its_centre_of_mass_is_told_late(when):
+    """The goal is one of the object's frame, wherever the centre of mass is believed to be."""
+    reach_with_late_centre("group", group_scenario(), "plate", (0.7, 0.3, 0.8), when, 5e-3)
+
+
+@pytest.mark.long
+def test_a_swarm_brings_the_object_to_its_goal_when_its_centre_of_mass_is_told_late():
+    scenario = load_scenario("swarm-square").settings("bridge", world="planar")
+    scenario = scenario.settings("swarm", position_tolerance=0.008)
+    (name,) = scenario.objects
+    reach_with_late_centre("swarm", scenario, name, (0.6, 0.2, 0.5), JobState.PUSHING, 0.01)
+
+
+def reach_with_late_centre(system, scenario, name, goal, when, most):
+    spec, start = scenario.objects[name]
+    com = (0.02, -0.016)
+    world = replace(scenario, objects={name: (replace(spec, com=com), start)})
+    with LockstepRun(scenario, world=world, quiet=True, system=system) as run:
+        run.start()
+        run.teams[""].send_goal(np.array(goal))
+        assert run.spin_until(lambda: run.observer.state.state == when, 60.0)
+        tell(
+            run,
+            {(name, f"com_{a}"): (c, c - 1e-3, c + 1e-3) for a, c in zip("xy", com, strict=True)},
+        )
+        assert run.spin_until(lambda: run.teams[""].ended, 300.0)
+        state, trace = run.observer.state, run.teams[""].observer.trace
+        assert state.error_code == 0, state.reason
+        off = trace.object[-1] - goal
+        assert np.hypot(*off[:2]) < most, 1e3 * off[:2]
+
+
 def test_a_group_pushes_on_with_the_friction_that_it_is_told():
-    scenario = group_scenario()
+    scenario = group_scenario().settings("group", push__stop_before_slip=False)
     with LockstepRun(scenario, quiet=True, system="group") as run:
         run.start()
         pushing(run, (0.5, 0.3, 0.4))
