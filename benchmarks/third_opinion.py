@@ -218,7 +218,7 @@ def run() -> dict[str, Any]:
         result[f"{one}, {two}"] = {"mm": away.tolist(), "rad": turned.tolist()}
         print(
             f"  {one:8s} and {two:8s}: median {np.median(away):.2f} mm, "
-            f"{np.median(turned):.4f} rad; nine of ten within {np.percentile(away, 90):.2f} mm, "
+            f"{np.median(turned):.4f} rad; 90th percentile {np.percentile(away, 90):.2f} mm, "
             f"{np.percentile(turned, 90):.4f} rad"
         )
     return result

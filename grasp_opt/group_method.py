@@ -34,6 +34,8 @@ SECTIONS: dict[str, type[Any]] = {
     "control": GroupControlSettings,
     "moves": MoveSettings,
 }
+PATIENCE = 10.0
+"""Time [s] without poses of a robot after which a task ends, as without those of the object."""
 _PER_NEWTON = 0.12  # [m] that an arrow is long
 
 
@@ -49,6 +51,7 @@ class GroupMethod:
             InlinePlans(arena.grid, arena.object, self._names[0]) if source is None else source
         )
         self._asked: Request | None = None
+        self._complete = math.inf  # [s] of the last frame with all robots
         self._finder = WayFinder(FreeSpace(arena.grid), arena.item.geometry.outline, 0.0)
         self.job = GroupJob(
             arena.item,
@@ -114,6 +117,7 @@ class GroupMethod:
     def begin(self, task: Task, belief: Belief) -> None:
         """See Method."""
         self._take_up(belief)
+        self._complete = math.inf
         if task.times:
             self.job.begin_along(_trajectory(task, self._item))
         else:
@@ -122,9 +126,13 @@ class GroupMethod:
     def step(self, seen: Seen, belief: Belief) -> Told:
         """See Method: robots stand while one of them is not seen."""
         self._take_up(belief)
-        if any(n not in seen.robots for n in self._names):
+        if missing := [n for n in self._names if n not in seen.robots]:
             self.job.rest(seen.time)
+            self._complete = min(self._complete, seen.time)
+            if seen.time - self._complete > PATIENCE:
+                self.end(JobError.POSES_STALE, f"no poses of '{missing[0]}'")
             return Told()
+        self._complete = seen.time
         planning = self._see_to_plans(seen, belief)
         pose = self._item.mass_pose(seen.object)
         robots = np.array([seen.robots[n] for n in self._names])

@@ -291,7 +291,7 @@ class StepPlanner:
             try:
                 placement = yield from robust_search(
                     *(self._item, piece.trajectory, count, self._radius, self.force, weights),
-                    *(free, self._believed),
+                    *(free, self._believed, s.margin),
                 )
                 if placement.margin < s.margin - 1e-9 and not self._certain(placement, piece):
                     doubtful.append(placement)

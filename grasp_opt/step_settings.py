@@ -52,7 +52,8 @@ class StepSettings:
         low=0.0,
         high=1.0,
         doc="Margin of the grasp-task compatibility test (the sine of an angle) with which a "
-        "placement is accepted; if no placement reaches this margin, more robots push "
+        "placement is accepted; if no placement reaches this margin, more robots push, and if that "
+        "does not help, a placement with less is used. A certified margin of 0 is enough, too "
         "(dimensionless).",
     )
     steps: int = bounded(

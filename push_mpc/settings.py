@@ -154,18 +154,19 @@ class TrackerSettings:
         0.85,
         low=0.1,
         high=1.0,
-        doc="Fraction of the stable curvature that the controller may use (dimensionless)",
+        doc="Fraction of the limits of the stable curvature that the controller may use "
+        "(dimensionless)",
     )
     slip_warning: float = bounded(
         1.0,
         low=0.0,
         high=60.0,
         doc="Time by which the controller looks ahead along the path of a push for a bend on which "
-        "the object is expected to slip (s); without effect until a belief has been published",
+        "the object may slip (s); without effect until a belief has been published",
     )
     stop_before_slip: bool = bounded(
         True,
-        doc="Whether a push ends before a bend on which the object is expected to slip, so that a "
+        doc="Whether a push ends before a bend on which the object may slip, so that a "
         "new plan is made; otherwise there is only a warning",
     )
     pose_delay: float = bounded(

@@ -58,7 +58,7 @@ class Tick:
     """Outcome of one tick: command, and whether the task has ended, and how.
 
     stick_margin: [rad/s] see ``push_model.stick_certificate``; nan where no interval is believed,
-    or the robot stands. slip_in: [s] after which the object is expected to slip on the path ahead;
+    or the robot stands. slip_in: [s] after which the object may slip on the path ahead;
     nan if it is not. alarm: the same in words, empty if it is not.
     """
 

@@ -232,8 +232,8 @@ class TrajectoryTracker:
         kappa = omega[first] / v[first]
         limit = limits.maximum if kappa > 0.0 else limits.minimum
         return first * _LOOK, (
-            f"the object is expected to slip in {first * _LOOK:.1f} s: the path has a curvature of "
-            f"{kappa:.2f} 1/m there, and at most {limit:.2f} 1/m is stable for what is believed now"
+            f"the object may slip in {first * _LOOK:.1f} s: the path has a curvature of "
+            f"{kappa:.2f} 1/m there, and for what is believed now at most {limit:.2f} 1/m is safe"
         )
 
     def _contact(self, push: Push, grasp: GraspEstimate) -> Contact:

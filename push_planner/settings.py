@@ -121,8 +121,8 @@ class PlannerSettings:
         0.75,
         low=0.1,
         high=1.0,
-        doc="Fraction of the stable curvature that plans may use; the rest is a margin for "
-        "lower friction (dimensionless)",
+        doc="Fraction of the limits of the stable curvature that plans may use; the rest is a "
+        "margin for lower friction (dimensionless)",
     )
     certified_trust: float = bounded(
         0.9,

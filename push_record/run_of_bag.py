@@ -137,6 +137,7 @@ class _Seen:
         self.system = self.world = ""
         self.restarted = False
         self._ended: dict[str, bool] = {}
+        self._idle: dict[str, bool] = {}
         self._jobs: dict[str, int] = {}
         self._refusals: dict[str, int] = {}
         self._found: list[Input] = []
@@ -216,6 +217,13 @@ class _Seen:
                 self._begun.append((team, goal, time, self._ended.get(team, False)))
             self._jobs[team] = job
         idle = int(message.state) == _IDLE and not message.plan_ready
+        if self._idle.get(team, False) and not idle and job == before:
+            raise CannotRerun(
+                "a job of the bag came as a trajectory or as several targets in an action "
+                "(push_along, swarm_move), whose goals are not in the bag; only goals on goal_pose "
+                "and of move_object can be repeated"
+            )
+        self._idle[team] = idle
         self._ended[team] = refused or (idle and job > 0)
 
     @staticmethod

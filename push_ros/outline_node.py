@@ -102,7 +102,7 @@ class OutlineNode(Node):
         )
         gate = declare_settings(self, PoseGateSettings, poses, "poses", f"{KIND}.poses")
         teams = len(scenario.teams) > 1
-        self.source = f"outline estimator/{self.object}" if teams else "outline estimator"
+        self.source = f"outline_estimator/{self.object}" if teams else "outline_estimator"
         self._said: Array | None = None if self.settings.radius else first
         self._forgotten, self._robots = 0, set(team)
         self._diagnostics = Diagnostics(self, names, self._state)

@@ -134,7 +134,7 @@ def statistics_of(what: Any, rows: list[Row]) -> Mapping[str, Any]:
 
 
 def _refuse_unused(name: str, what: Experiment, options: StudyOptions) -> None:
-    """FAULTS 29: an option that does nothing is refused by name."""
+    """An option that does nothing is refused by name."""
     why = {
         "uncertainty": "its trials have a fixed one",
         "world": "its scenarios choose the world, by bridge.world",

@@ -1,7 +1,7 @@
 """The colours of bodies, plans and layers: the same on the page, in reports and in pictures.
 
-Colours of robots and sides are those of Okabe and Ito, which people with colour-blindness can tell
-apart. Whatever a colour says is also said by a name, a dash or a shape.
+Five of the colours of robots and sides are those of Okabe and Ito, which people with
+colour-blindness can tell apart. Whatever a colour says is also said by a name, a dash or a shape.
 """
 
 import colorsys
@@ -23,7 +23,8 @@ OBJECT, GOAL, PLAN, INK = "#8a6a4a", "#c22f3d", "#777777", "#222222"
 OBSTACLE = "#6e6e6e"
 
 EACH = 50
-"""Number of robots up to which each has a colour of its own."""
+"""Number of robots up to which they have the colours of ``ROBOTS``, in turn; more robots have the
+colour of their team."""
 
 _LAYERS = {
     "forces": "#1b7837",

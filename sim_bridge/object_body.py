@@ -32,7 +32,8 @@ class Feet:
     damping: float
 
     def under(self, spec: ObjectSpec) -> "Feet":
-        """Stiffer ones where the object is so heavy that its bottom would touch the floor."""
+        """Stiffer ones where the object is so heavy that it would sink by more than half a
+        millimetre."""
         sinking = spec.mass * GRAVITY / (spec.feet * self.stiffness)
         factor = max(1.0, sinking / _SINKING)
         return Feet(factor * self.stiffness, factor * self.damping)

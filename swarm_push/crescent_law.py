@@ -3,8 +3,9 @@
 The density to be covered lies along the object's rim, where the desired twist moves the outline
 away from the robots (``crescent.py``). Each robot moves to the centroid of its Voronoi cell
 (Lloyd's control), round the object where that is in the way. As soon as the robots in contact can
-make most of the wrench that the motion needs, the density moves with the desired twist. Robots then
-follow it by feed-forward of its velocity plus Lloyd's control.
+make most of the wrench that the motion needs, they push: each moves with the velocity that the
+desired twist gives its place, plus Lloyd's control. The density is put at the measured pose of the
+object at every tick.
 """
 
 import math

@@ -24,10 +24,11 @@ SUBJECTS = {
 }
 _HEAD = (
     "# Equations and code\n\n"
-    "This page tells where each numbered equation and algorithm of the thesis is in the code. For\n"
-    "each number, it lists the docstrings that cite it. [Errata](errata.md) explains the\n"
-    "equations that are printed with an error. `python docs/_ext/equation_index.py` writes this\n"
-    "page, and a test compares it with the code.\n"
+    "This page tells where each numbered equation and algorithm of the thesis is cited in the\n"
+    "code. A file alone stands for the docstring of the module. The names after a colon are\n"
+    "classes, functions and constants of the file whose docstrings cite the number.\n"
+    "[Errata](errata.md) explains the equations that are printed with an error.\n"
+    "`python docs/_ext/equation_index.py` writes this page, and a test compares it with the code.\n"
 )
 _RANGE = re.compile(r"\(([2-4])\.(\d+)[a-h]?\)(?:\s*-\s*\((\d)\.(\d+)[a-h]?\))?")
 _ALGORITHM = re.compile(r"Algorithms? (\d)(?:(?: and | or |, )(\d))?")

@@ -73,8 +73,8 @@ def _cell(contest: str, method: str, entry: Entry, rows: Sequence[Row]) -> Cell 
 
 
 def mean_interval(values: np.ndarray) -> Interval:
-    """95 % interval of a mean (Student's t); without bounds for fewer than two values."""
-    if len(values) < 2:
+    """95 % interval of a mean (Student's t); without bounds for fewer than three values."""
+    if len(values) < 3:
         return -math.inf, math.inf
     half = float(student.ppf(0.975, len(values) - 1) * values.std(ddof=1) / math.sqrt(len(values)))
     return float(values.mean()) - half, float(values.mean()) + half

@@ -149,6 +149,19 @@ def test_a_robust_placement_has_margin_pushes_only_and_asks_no_robot_for_too_muc
         robust_placement(item, task, 2, 0.05, 0.5, FEW)
 
 
+def test_a_greater_margin_is_asked_for_where_there_is_one():
+    """Else half of it, or what there is."""
+    item, reached = load_object("plate_ellipse"), []
+    for task in list(SIX.values())[:4]:
+        usual = robust_placement(item, task, 3, 0.05, 5.0, FEW)
+        wide = robust_placement(item, task, 3, 0.05, 5.0, FEW, margin=0.25)
+        assert wide.margin >= usual.margin - 1e-9 and wide.cost >= usual.cost * (1 - 1e-6)
+        reached.append(wide.margin >= 0.125 - 1e-9)
+    assert all(reached)
+    none = robust_placement(item, SIX["polynomial-3"], 3, 0.05, 5.0, FEW, margin=0.0)
+    assert none.margin < 0.1
+
+
 @pytest.mark.parametrize("name", list(plates()))
 @pytest.mark.parametrize("count", [2, 3])
 def test_no_placement_costs_less_than_the_lower_bound(name, count):

@@ -54,6 +54,22 @@ def test_when_the_object_is_not_seen_all_stand_and_go_on_when_it_is():
         assert run.supervisor.method.job.dead == () and run.supervisor.method.job.replans == 0
 
 
+@pytest.mark.parametrize("at", [0.0, 24.0])
+def test_when_a_robot_is_never_seen_again_the_job_ends(at):
+    """Its place is not known, so nobody may move; before the first push and in mid-push."""
+    who = next(iter(VALUES["robots"]))
+    events = [{"kind": "drop_poses", "at": at, "bodies": [who], "duration": 100.0}]
+    with running(events=events) as run:
+        told = commands(run)
+        run.start()
+        state = run.reach(FAR, 500.0)
+        assert state is not None and state.error_code == JobError.POSES_STALE
+        assert f"no poses of '{who}'" in state.reason
+        blind = [speed for when, speed in told if when > at + 0.5]
+        assert len(blind) > 500 and max(blind) == 0.0
+        assert run.bridge.time < at + 12.0
+
+
 @pytest.mark.long
 def test_an_object_that_somebody_moves_is_noticed_and_brought_all_the_same():
     """Row 16."""

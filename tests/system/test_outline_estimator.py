@@ -56,7 +56,7 @@ def test_with_a_radius_only_a_pose_is_reached_and_the_outline_found():
         away, turned = error(run)
         assert away < 0.03 and turned < 0.06
         seconds, node = run.bridge.time, estimator(run)
-        assert {m.source for m in said} == {"outline estimator"}
+        assert {m.source for m in said} == {"outline_estimator"}
         assert 5 < len(said) < seconds + 2
         assert np.hypot(*corners(said[0]).T) == pytest.approx(RADIUS)
         assert mistake(corners(said[0]))[0] > 0.5

@@ -5,11 +5,13 @@ import json
 import numpy as np
 import pytest
 import rclpy
+from rclpy.action import ActionClient
 from rclpy.serialization import deserialize_message, serialize_message
 from std_srvs.srv import SetBool, Trigger
 
 from planar_push.main import main
 from push_model.belief import Interval
+from push_msgs.action import SwarmMove
 from push_msgs.msg import Belief, ControllerStatus
 from push_msgs.srv import Displace, Kill, Reset
 from push_record.bag import BagWriter, read_bag, read_metadata, read_raw
@@ -211,6 +213,24 @@ def test_what_cannot_be_run_again_is_refused_with_a_sentence(tmp_path, capsys):
     assert main(["rerun", str(tmp_path / "nowhere")]) == 2
     assert main(["rerun", str(tmp_path / "foreign"), "--set", "push_speed"]) == 2
     assert "NODE.SETTING=VALUE" in capsys.readouterr().err
+
+
+def test_a_bag_with_targets_that_came_by_an_action_is_refused(tmp_path, capsys):
+    """They are not in the bag: a run without them would differ, and look like a fault."""
+    bag = tmp_path / "bag"
+    with (
+        own_domain(),
+        LockstepRun(scenario_of("swarm"), quiet=True, system="swarm", record=bag) as run,
+    ):
+        run.start()
+        client = ActionClient(run.observer, SwarmMove, "/swarm_move")
+        assert run.spinner.until(client.server_is_ready, 5.0)
+        sent = client.send_goal_async(SwarmMove.Goal(x=[0.05], y=[0.0], theta=[]))
+        assert run.spin_until(sent.done, 5.0) and sent.result().accepted
+        begin = run.bridge.time
+        run.spin_until(lambda: run.bridge.time > begin + 1.0, 5.0)
+    assert main(["rerun", str(bag)]) == 2
+    assert "push_along, swarm_move" in capsys.readouterr().err
 
 
 @pytest.mark.live
