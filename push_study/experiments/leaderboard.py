@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
+from push_model.outside import source_digest
 from push_model.settings import SettingsError
 from push_record.revision import revision
 from push_study.leaderboard.contests import CONTESTS, contest
@@ -36,7 +37,10 @@ def tasks(options: StudyOptions) -> list[Match]:
             )
     world = options.world or OPTIONS["world"]
     found = [
-        Match(name, options.seed + k, str(options.out), method, world, options.uncertainty)
+        Match(
+            *(name, options.seed + k, str(options.out), method, world, options.uncertainty),
+            source_digest(method) + source_digest(entry.system),
+        )
         for k in range(options.trials)
         for name in options.scenarios
         for method, entry in who.items()

@@ -23,7 +23,8 @@ _SLACK = 1.05  # of a tolerance, for methods only know noisy poses
 
 @dataclass(frozen=True)
 class Match:
-    """scenario: name of the contest. method: name of the entry, or MODULE:ATTRIBUTE."""
+    """scenario: name of the contest. method: name of the entry, or MODULE:ATTRIBUTE. source: of the
+    files of an entry from outside, which changes when they do."""
 
     scenario: str
     seed: int
@@ -31,6 +32,7 @@ class Match:
     method: str
     world: str
     uncertainty: str
+    source: str = ""
 
 
 def play(match: Match) -> Row:

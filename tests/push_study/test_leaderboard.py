@@ -196,6 +196,23 @@ def test_only_settings_that_a_method_has_are_set(monkeypatch):
     assert seen[1] == seen[2] == {"position_tolerance": 0.1, "orientation": False, "seed": 7}
 
 
+def test_a_changed_file_of_somebody_else_is_played_again(tmp_path, monkeypatch):
+    """The rows of the suite are known by its revision."""
+    file = tmp_path / "a_rival_from_outside.py"
+    text = "from tests.push_study.test_leaderboard import OUTSIDER\n"
+    file.write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    options = StudyOptions(
+        scenarios=("open-square",), out=tmp_path / "x", seed=5, trials=1,
+        methods=("crescent", "a_rival_from_outside:OUTSIDER"),
+    )  # fmt: skip
+    first, same = leaderboard.tasks(options), leaderboard.tasks(options)
+    file.write_text(text + "# another version\n")
+    ours, theirs = leaderboard.tasks(options)
+    assert first == same and ours == first[0] and ours.source == ""
+    assert theirs != first[1] and theirs.source != first[1].source
+
+
 @pytest.mark.long
 def test_one_command_makes_the_page_with_a_method_from_outside(tmp_path, monkeypatch, capsys):
     """A short slice: two methods of the suite and one of somebody else; equal seeds, equal rows."""
