@@ -30,6 +30,7 @@ STATUS = (
 
 _RESET = 0.5  # [s] by which the clock goes back when the world is reset
 _SPACING = 0.02  # [s] shortest time between frames that are kept
+_ROUNDING = 1e-6  # [s] of stamps, which are times of day in a lab
 _MOMENTS = 2.0  # [s] between complete reports that are kept for pictures
 _MOVING = (1, 2)  # modes MOVE and PUSH of ControllerStatus
 
@@ -115,7 +116,8 @@ class Job:
 
 @dataclass
 class BagContents:
-    """time ``(n,)`` [s]; poses ``(n, 3)`` by body, ground truth, nan where unknown.
+    """time ``(n,)`` [s]; poses ``(n, 3)`` by body, nan where unknown. measured: whether these come
+    from motion capture, because the bag has no ground truth.
 
     If the world was reset during the recording, times go on where they were.
 
@@ -129,6 +131,7 @@ class BagContents:
     poses: dict[str, Array] = field(default_factory=dict)
     status: dict[str, dict[str, Array]] = field(default_factory=dict)
     jobs: dict[str, Job] = field(default_factory=dict)
+    measured: bool = False
 
 
 class _Suffixes(Container[str]):
@@ -169,7 +172,7 @@ class _Frames:
             time = self._newest
         self._last = (time, frame)
         self._newest = time
-        if not self.times or not 0.0 <= time - self.times[-1] < _SPACING - 1e-9:
+        if not self.times or not 0.0 <= time - self.times[-1] < _SPACING - _ROUNDING:
             self._keep()
 
     @property
@@ -208,7 +211,8 @@ def bag_scenario(bag: Path) -> tuple[Scenario, dict[str, str]]:
 
 
 def load(bag: Path | str, moments: float = _MOMENTS) -> BagContents:
-    """Read the data of a report, or of a playback.
+    """Read the data of a report, or of a playback. Without ground truth, as in a lab, the poses are
+    those that were measured.
 
     moments: [s] between whole reports that are kept, with their shapes.
 
@@ -216,7 +220,15 @@ def load(bag: Path | str, moments: float = _MOMENTS) -> BagContents:
     ------
     ValueError: the bag holds no scenario. FileNotFoundError: it is none.
     """
-    bag = Path(bag)
+    contents = _read(Path(bag), moments, "ground_truth/poses")
+    if len(contents.time):
+        return contents
+    found = _read(Path(bag), moments, "poses")
+    return replace(found, measured=len(found.time) > 0)
+
+
+def _read(bag: Path, moments: float, poses: str) -> BagContents:
+    """poses: end of the topic that the poses are taken from."""
     scenario, metadata = bag_scenario(bag)
     collisions = Collisions(frozenset(scenario.robots), frozenset(scenario.objects))
     contents = BagContents(scenario, metadata, collisions)
@@ -224,7 +236,7 @@ def load(bag: Path | str, moments: float = _MOMENTS) -> BagContents:
     status: dict[str, list[list[float]]] = {}
     series: dict[str, ReportSeries] = {}
     wanted = _Suffixes(
-        "ground_truth/poses",
+        poses,
         "job_state",
         "push_plan",
         "group_plan",
@@ -234,7 +246,7 @@ def load(bag: Path | str, moments: float = _MOMENTS) -> BagContents:
     )
     for record in read_bag(bag, cast(set[str], wanted)):
         m, shift = record.message, frames.shift
-        if record.topic.endswith("/ground_truth/poses"):
+        if record.topic.endswith(f"/{poses}"):
             frames.take(m)
         elif record.topic.endswith("/controller/status"):
             if m.mode in _MOVING:

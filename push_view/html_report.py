@@ -49,7 +49,11 @@ def _head(contents: BagContents) -> str:
     meta = contents.metadata
     duration = float(contents.time[-1] - contents.time[0]) if len(contents.time) else 0.0
     words = [
-        f"{duration:.1f} s of simulation" if duration else "no poses",
+        f"{duration:.1f} s, poses as measured"
+        if contents.measured
+        else f"{duration:.1f} s of simulation"
+        if duration
+        else "no poses",
         f"seed {meta.get('seed', '?')}",
         f"revision {meta.get('revision', '?')}",
     ]

@@ -109,12 +109,16 @@ def _heading(contents: BagContents, jobs: list[Job], errors: dict[str, FinalErro
         error = (
             f"the recording ends in the state {jobs[0].unfinished}, {errors[jobs[0].space]} off; "
         )
-    return (
-        f"{contents.scenario.name}   seed {meta.get('seed', '?')}   "
-        f"revision {meta.get('revision', '?')}\n"
-        f"{error}{duration:.1f} s sim time\n"
+    collisions = (
         f"collisions: {hits.between_robots} between robots, {hits.robots_with_walls} of robots and "
         f"{hits.objects_with_walls} of objects with walls, {hits.between_objects} between objects"
+    )
+    clock = "s sim time"
+    if contents.measured:
+        collisions, clock = "collisions: not known", "s, poses as measured by motion capture"
+    return (
+        f"{contents.scenario.name}   seed {meta.get('seed', '?')}   "
+        f"revision {meta.get('revision', '?')}\n{error}{duration:.1f} {clock}\n{collisions}"
     )
 
 

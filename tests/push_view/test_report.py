@@ -1,5 +1,6 @@
 """Reports from bags: one robot, several teams, a thousand bodies."""
 
+import json
 from dataclasses import replace
 
 import matplotlib.pyplot as plt
@@ -18,12 +19,14 @@ from push_ros.conversions import contacts_to_ros, pose_stamped_to_ros, poses_to_
 from push_scenario.scenario import load_scenario
 from push_view.bodies import bodies_of
 from push_view.drawing import body_vertices, draw_trajectory, moments
+from push_view.playback import playback_json
 from push_view.report import PRODUCTS, final_error, write_report
 from sim_bridge.world import Contact
 
 TYPES = {
     "group_plan": "push_msgs/msg/GroupPlan",
     "ground_truth/poses": "push_msgs/msg/Poses",
+    "poses": "push_msgs/msg/Poses",
     "contacts": "push_msgs/msg/Contacts",
     "job_state": "push_msgs/msg/JobState",
     "controller/status": "push_msgs/msg/ControllerStatus",
@@ -120,6 +123,32 @@ def test_contents_of_several_teams(two_teams):
     error = final_error(contents, a)
     assert (error.position, error.orientation) == pytest.approx((0.003, 0.02))
     assert final_error(contents, b).position == pytest.approx(0.01)  # where it was seen last
+
+
+def test_a_bag_of_a_lab_shows_the_poses_that_were_measured(scenario, tmp_path):
+    """It has no ground truth. Where there is one, measured poses do not count."""
+    hall = crowd(scenario, 1, 1)
+    for name, truth in (("lab", False), ("sim", True)):
+        bag = Bag(tmp_path / name, hall)
+        for i in range(50):
+            t = 1.7e9 + 0.02 * i
+            seen = {"r0": np.array([0.01 * i, 0.2, 0.0]), "box0": np.array([0.1, 0.01 * i, 0.0])}
+            bag.write("/poses", poses_to_ros(seen, t), t)
+            if truth:
+                bag.poses({n: p + [0.0, 0.0, 0.5] for n, p in seen.items()}, t)
+        bag.state("/", "PUSHING", 1.7e9 + 0.2, ["r0"], "box0", [0.1, 0.5, 0.0])
+        bag.state("/", "IDLE", 1.7e9 + 0.98, ["r0"], "box0", [0.1, 0.5, 0.0])
+        found = load(bag.close())
+        assert found.measured is not truth and len(found.time) == 50
+        assert found.poses["box0"][:, 1] == pytest.approx(0.01 * np.arange(50))
+        assert found.poses["box0"][-1, 2] == (0.5 if truth else 0.0)
+    errors = write_report(tmp_path / "lab", tmp_path / "out", animate=False)
+    assert errors["position_error_m"] == pytest.approx(0.01)
+    text = (tmp_path / "out" / "report.html").read_text()
+    assert "poses as measured" in text and "of simulation" not in text
+    data = json.loads(json.dumps(playback_json(tmp_path / "lab"), allow_nan=False))
+    x, y, _ = data["poses"][data["bodies"]["names"].index("box0")]
+    assert len(y) == 50 and (x[0], y[-1]) == (1000, 4900)
 
 
 def test_report_of_several_teams_has_a_page_each(two_teams, tmp_path):
