@@ -6,14 +6,14 @@ that does not move although it is told to is left where it is, and the others go
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from grasp_opt.contact_outline import ContactOutline
 from grasp_opt.group_control import GroupControlSettings
 from grasp_opt.group_push import GroupPush, GroupPushSettings, GroupStep, Phase
-from grasp_opt.job_state import MoveWatch, Step, Tally, Task
+from grasp_opt.job_state import MoveWatch, Request, Step, Tally, Task
 from grasp_opt.moves import Mover, MoveSettings, back_off
 from grasp_opt.object_trajectory import ObjectTrajectory
 from grasp_opt.prediction import GroupPrediction
@@ -57,29 +57,6 @@ class GroupJobSettings:
         high=3600.0,
         doc="Time limit for the robots to reach their places between two pushes (s).",
     )
-
-
-@dataclass(frozen=True)
-class Request:
-    """What the next step is to be planned for; poses of the centre of mass. trajectory: that is to
-    be followed, where one was given instead of a goal. fewest: robots that are to push at least."""
-
-    pose: Array
-    goal: Array
-    robots: Array
-    dead: tuple[int, ...]
-    trajectory: ObjectTrajectory | None = None
-    fewest: int = 0
-
-    def about(self, point: Array) -> "Request":
-        """See ``Task.about``."""
-        off = np.array([*point, 0.0])
-        return replace(
-            self,
-            pose=se2.compose(self.pose, off),
-            goal=se2.compose(self.goal, off),
-            trajectory=self.trajectory and self.trajectory.about(point),
-        )
 
 
 class GroupJob:

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from grasp_opt.group_control import GroupControlSettings
-from grasp_opt.group_job import GroupJob, GroupJobSettings, Request
+from grasp_opt.group_job import GroupJob, GroupJobSettings
 from grasp_opt.group_push import GroupPushSettings
+from grasp_opt.job_state import Request
 from grasp_opt.moves import MoveSettings
 from grasp_opt.object_trajectory import ObjectTrajectory, sampled
 from grasp_opt.plan_source import InlinePlans, PlanFailed, PlanSource

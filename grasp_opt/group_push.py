@@ -214,7 +214,8 @@ class GroupPush:
             robot.footprint_radius,
             before.settings,
         )
-        if np.array_equal(self.controller.outline.shape.outline, before.outline.shape.outline):
+        old, new = (c.outline.shape.outline for c in (before, self.controller))
+        if old.shape == new.shape and np.allclose(old - moved, new, rtol=0.0, atol=1e-9):
             self.controller.offsets = before.offsets
 
     @property

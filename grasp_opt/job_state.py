@@ -1,4 +1,5 @@
-"""What a group's job remembers: its task, its count of pushes and failures, the step under way."""
+"""What a group's job remembers: its task, the step it asks for, its count of pushes and failures,
+the step under way."""
 
 from dataclasses import dataclass, replace
 
@@ -43,6 +44,29 @@ class Task:
         """The trajectory was followed until a time [s]; more: whether a part of it is left."""
         if self.along is not None:
             self.along = self.along.between(time, self.along.duration) if more else None
+
+
+@dataclass(frozen=True)
+class Request:
+    """What the next step is to be planned for; poses of the centre of mass. trajectory: that is to
+    be followed, where one was given instead of a goal. fewest: robots that are to push at least."""
+
+    pose: Array
+    goal: Array
+    robots: Array
+    dead: tuple[int, ...]
+    trajectory: ObjectTrajectory | None = None
+    fewest: int = 0
+
+    def about(self, point: Array) -> "Request":
+        """See ``Task.about``."""
+        off = np.array([*point, 0.0])
+        return replace(
+            self,
+            pose=se2.compose(self.pose, off),
+            goal=se2.compose(self.goal, off),
+            trajectory=self.trajectory and self.trajectory.about(point),
+        )
 
 
 @dataclass

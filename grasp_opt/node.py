@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from grasp_opt.group_job import Request
 from grasp_opt.group_messages import plan_from_ros
 from grasp_opt.group_method import GROUP
+from grasp_opt.job_state import Request
 from grasp_opt.plan_source import PlanFailed
 from grasp_opt.step_planner import GroupPlan
 from push_job.method import Seen, Task

@@ -3,7 +3,7 @@
 import time
 from typing import Protocol
 
-from grasp_opt.group_job import Request
+from grasp_opt.job_state import Request
 from grasp_opt.placement import PlacementSettings
 from grasp_opt.sequencing import NoStep
 from grasp_opt.step_planner import GroupPlan, StepPlanner, TooFew

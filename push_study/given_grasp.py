@@ -9,8 +9,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from grasp_opt.group_job import Request
 from grasp_opt.group_method import SECTIONS, GroupMethod, check_team
+from grasp_opt.job_state import Request
 from grasp_opt.object_trajectory import ObjectTrajectory
 from grasp_opt.placement import NoPlacement
 from grasp_opt.plan_source import PlanFailed

@@ -110,9 +110,16 @@ def test_an_outline_that_is_taken_as_exact_and_is_not_ends_the_push():
 def test_a_new_belief_with_the_same_outline_keeps_the_places_of_contact():
     group = GroupPush(ITEM, ROBOT, WAYS, BEND)
     group.controller.offsets = np.array([0.004, 0.0, 0.004])
-    group.believe(replace(ITEM, contact_friction=0.3), ROBOT)
+    group.believe(replace(ITEM, contact_friction=0.3), ROBOT, np.zeros(2))
     assert group.controller.friction == 0.3
     assert group.controller.offsets.tolist() == [0.004, 0.0, 0.004]
+    com = np.array([0.01, -0.02])
+    group.believe(replace(ITEM, com=tuple(com.tolist())), ROBOT, com)
+    assert group.controller.offsets.tolist() == [0.004, 0.0, 0.004]
+    group.believe(ITEM, ROBOT, -com)
+    assert group.trajectory.pose == pytest.approx(BEND.pose)
     larger = tuple((float(x), float(y)) for x, y in inset(ITEM.outline, -0.004))
-    group.believe(replace(ITEM, shape=PolygonShape(vertices=larger, frame="given")), ROBOT)
+    group.believe(
+        replace(ITEM, shape=PolygonShape(vertices=larger, frame="given")), ROBOT, np.zeros(2)
+    )
     assert not group.controller.offsets.any()
