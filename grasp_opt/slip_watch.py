@@ -19,7 +19,15 @@ from push_model.stick_certificate import ContactBelief
 RESERVE = 0.05
 """Margin for the believed values that is enough where nothing is certified, or that of the plan if
 it has less. Placements ask for twice as much, as far as they can have it."""
+SAMPLES = 60
+"""Moments of a trajectory at which it is tested, at most: that takes some milliseconds."""
 _ROUNDING = 1e-9
+
+
+def spread(count: int) -> Array:
+    """Indices of at most ``SAMPLES`` of so many moments, the first and the last among them."""
+    some: Array = np.unique(np.linspace(0, count - 1, min(count, SAMPLES)).round().astype(int))
+    return some
 
 
 class SlipWatch:
@@ -40,8 +48,9 @@ class SlipWatch:
         planned; trajectory: of that point. believed: intervals at that time."""
         self._contacts, self._item = contacts, item
         twists = trajectory.body_twists
-        moving = np.any(twists != 0.0, axis=1)
-        self._times, self._twists = trajectory.time[moving], twists[moving]
+        moving = np.flatnonzero(np.any(twists != 0.0, axis=1))
+        some = moving[spread(len(moving))]
+        self._times, self._twists = trajectory.time[some], twists[some]
         self._unsure = np.empty(0)  # [s] along the trajectory
         self.certified: float | None = None
         self._enough = RESERVE

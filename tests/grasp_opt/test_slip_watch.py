@@ -8,7 +8,7 @@ import pytest
 from grasp_opt.grasp_certificate import GraspCertificate
 from grasp_opt.object_trajectory import polynomial, screw, study_trajectories
 from grasp_opt.placement import Placer
-from grasp_opt.slip_watch import RESERVE, SlipWatch
+from grasp_opt.slip_watch import RESERVE, SlipWatch, spread
 from grasp_opt.wrench_cone import margin, task_wrenches, wrench_rays
 from push_model import se2
 from push_model.belief import Interval
@@ -73,13 +73,13 @@ def test_the_first_wrench_that_is_not_held_is_told():
         believed = replace(item, contact_friction=friction, com=tuple(com))
         given = intervals(friction, com, 0.1, 0.002)
         watch.believe(believed, given)
-        held = margins(item, contacts, task, friction, com)
+        moving = np.flatnonzero(np.any(task.body_twists != 0.0, axis=1))
+        some = moving[spread(len(moving))]
+        held = margins(item, contacts, task, friction, com)[some]
         assert watch.nominal == pytest.approx(held.min(), abs=1e-9)
         assert watch.certified <= watch.nominal + 1e-9
-        sure = GraspCertificate(item, given, task.body_twists).margins(contacts)
-        certified = np.ones(len(task.time))
-        certified[np.any(task.body_twists != 0.0, axis=1)] = sure
-        short = task.time[(held < enough - 1e-9) & (certified < -1e-9)]
+        sure = GraspCertificate(item, given, task.body_twists[some]).margins(contacts)
+        short = task.time[some][(held < enough - 1e-9) & (sure < -1e-9)]
         for time in random.uniform(0.0, task.duration, 5):
             later = short[short >= time]
             if not len(later):
