@@ -54,7 +54,7 @@ def intervals(friction, com, part, wide):
 
 def test_a_push_is_sure_under_the_belief_that_it_was_planned_with():
     random = np.random.default_rng(1)
-    for item, contacts, task in grasps(random, 40):
+    for item, contacts, task in grasps(random, 25):
         given = intervals(item.contact_friction, (0.0, 0.0), random.uniform(0.0, 0.9), 0.01)
         watch = SlipWatch(contacts, task, item, random.choice([None, given]))
         assert watch.ahead(0.0) == np.inf
@@ -65,7 +65,7 @@ def test_a_push_is_sure_under_the_belief_that_it_was_planned_with():
 def test_the_first_wrench_that_is_not_held_is_told():
     """Held against the margins of the believed values, sample by sample."""
     random, told, certain = np.random.default_rng(2), 0, 0
-    for item, contacts, task in grasps(random, 60):
+    for item, contacts, task in grasps(random, 40):
         watch = SlipWatch(contacts, task, item, None)
         enough = min(RESERVE, watch.nominal)
         friction = item.contact_friction * random.uniform(0.05, 1.0)
@@ -91,7 +91,7 @@ def test_the_first_wrench_that_is_not_held_is_told():
         certain += watch.certified >= 0.0
         watch.believe(item, None)
         assert watch.ahead(0.0) == np.inf and watch.certified is None
-    assert told > 15 and certain > 5
+    assert told > 10 and certain > 3
 
 
 def test_a_trajectory_of_another_point_of_the_object():

@@ -54,7 +54,7 @@ def test_when_the_object_is_not_seen_all_stand_and_go_on_when_it_is():
         assert run.supervisor.method.job.dead == () and run.supervisor.method.job.replans == 0
 
 
-@pytest.mark.parametrize("at", [0.0, 24.0])
+@pytest.mark.parametrize("at", [0.0, pytest.param(24.0, marks=pytest.mark.long)])
 def test_when_a_robot_is_never_seen_again_the_job_ends(at):
     """Its place is not known, so nobody may move; before the first push and in mid-push."""
     who = next(iter(VALUES["robots"]))
