@@ -223,7 +223,7 @@ class _Seen:
                 "(push_along, swarm_move), whose goals are not in the bag; only goals on goal_pose "
                 "and of move_object can be repeated"
             )
-        self._idle[team] = idle
+        self._idle[team] = idle and job == before
         self._ended[team] = refused or (idle and job > 0)
 
     @staticmethod
