@@ -24,19 +24,19 @@ def around(random: np.random.Generator, count: int, item: ObjectSpec, radius: fl
     SettingsError: there is no room for so many.
     """
     reach, outline = max(_AROUND, 0.25 * math.sqrt(count)), item.outline
-    placed: list[Array] = []
+    placed = _Placed(count)
 
     def draw() -> bool:
         p = random.uniform(-reach, reach, 2)
+        if placed.nearest(p) <= 2.0 * radius + _GAP:
+            return False
         if inside(outline, p[None])[0] or distance(outline, p[None])[0] < radius + _GAP:
             return False
-        free = all(np.hypot(*(p - q)) > 2.0 * radius + _GAP for q in placed)
-        if free:
-            placed.append(p)
-        return free
+        placed.add(p)
+        return True
 
     _repeat(draw, count)
-    return np.column_stack([np.array(placed), random.uniform(-math.pi, math.pi, count)])
+    return np.column_stack([placed.points, random.uniform(-math.pi, math.pi, count)])
 
 
 def scattered(
@@ -55,18 +55,40 @@ def scattered(
     SettingsError: there is no room for so many.
     """
     low, high = space.places.min(axis=0), space.places.max(axis=0)
-    placed: list[Array] = []
+    placed, headings = _Placed(count), []
 
     def draw() -> bool:
         p = random.uniform(low, high)
-        discs = np.array([[*q[:2], radius] for q in placed]).reshape(-1, 3)
-        free = space.room(p[None], Obstacles((outline,), discs))[0] > radius + gap
-        if free:
-            placed.append(np.array([*p, random.uniform(-math.pi, math.pi)]))
-        return bool(free)
+        if placed.nearest(p) <= 2.0 * radius + gap:
+            return False
+        discs = np.column_stack([placed.points, np.full(placed.count, radius)])
+        if space.room(p[None], Obstacles((outline,), discs))[0] <= radius + gap:
+            return False
+        placed.add(p)
+        headings.append(random.uniform(-math.pi, math.pi))
+        return True
 
     _repeat(draw, count)
-    return np.array(placed)
+    return np.column_stack([placed.points, headings])
+
+
+class _Placed:
+    """Places ``(n, 2)`` [m] that have been found, of at most so many."""
+
+    def __init__(self, most: int) -> None:
+        self._all, self.count = np.empty((most, 2)), 0
+
+    @property
+    def points(self) -> Array:
+        return self._all[: self.count]
+
+    def add(self, point: Array) -> None:
+        self._all[self.count] = point
+        self.count += 1
+
+    def nearest(self, point: Array) -> float:
+        """[m] to the nearest of them; inf if there are none."""
+        return float(np.hypot(*(point - self.points).T).min(initial=math.inf))
 
 
 def _repeat(draw: Callable[[], bool], count: int) -> None:
