@@ -20,7 +20,8 @@ RESERVE = 0.05
 """Margin for the believed values that is enough where nothing is certified, or that of the plan if
 it has less. Placements ask for twice as much, as far as they can have it."""
 SAMPLES = 60
-"""Moments of a trajectory at which it is tested, at most: that takes some milliseconds."""
+"""Moments of a trajectory at which it is tested, at most. A test takes about 15 ms, in the tick in
+which a plan or a new belief comes."""
 _ROUNDING = 1e-9
 
 
@@ -33,8 +34,8 @@ def spread(count: int) -> Array:
 class SlipWatch:
     """Tests the contacts of a push for what is believed now.
 
-    certified: the certified margin of the whole push; None if no interval is believed. nominal:
-    its margin for the believed values.
+    certified: the certified margin of the whole push (sine of an angle, as of ``margin``); None if
+    no interval is believed. nominal: its margin for the believed values.
     """
 
     def __init__(
@@ -51,12 +52,13 @@ class SlipWatch:
         moving = np.flatnonzero(np.any(twists != 0.0, axis=1))
         some = moving[spread(len(moving))]
         self._times, self._twists = trajectory.time[some], twists[some]
-        self._unsure = np.empty(0)  # [s] along the trajectory
         self.certified: float | None = None
         self._enough = RESERVE
         self.believe(item, believed)
         self._enough = min(RESERVE, max(0.0, self.nominal))
-        self._unsure = np.empty(0)  # what was good enough to be planned is good enough
+        self._unsure = np.empty(
+            0
+        )  # [s] along the trajectory; what was good enough to be planned is good enough
 
     def believe(self, item: ObjectSpec, believed: ContactBelief | None) -> None:
         """Test the push for another belief. An outline that changes is not tested."""

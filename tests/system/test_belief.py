@@ -154,8 +154,7 @@ def test_a_group_ends_a_push_that_may_slip_and_plans_anew():
     scenario = group_scenario(two=True)
     with LockstepRun(scenario, quiet=True, system="group") as run:
         run.start()
-        told, seen = [], []
-        run.observer.create_subscription(Report, "/report", told.append, STATUS)
+        seen = []
         pushing(run, (0.5, 0.2, 0.6))
         job = run.supervisor.method.job
         before = job.watch.nominal
