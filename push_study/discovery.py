@@ -7,8 +7,10 @@ announced, and whatever latched message was sent, before the probe has had its t
 changes while many probes are heard, one after the other, the nodes will not find each other.
 """
 
-from collections.abc import Callable, Hashable
+from collections import Counter
+from collections.abc import Callable, Hashable, Iterable
 
+from rclpy.action import ActionClient
 from rclpy.node import Node
 from std_msgs.msg import Empty
 
@@ -24,6 +26,35 @@ _SETTLED = 3  # probes after which endpoints that are known are matched
 
 class NotDiscovered(RuntimeError):
     """Raised when nodes do not find each other."""
+
+
+def unmatched(nodes: Iterable[Node]) -> list[str]:
+    """Topics, services and actions over which nodes of this process do not reach each other yet.
+
+    A topic is reached when each of its publishers, and each of its subscriptions, has been matched
+    with all that the nodes have at the other end. A service or an action is reached when each of
+    its clients sees a server.
+    """
+    nodes = list(nodes)
+    publishers = [p for n in nodes for p in n.publishers]
+    subscriptions = [s for n in nodes for s in n.subscriptions]
+    sent = Counter(p.topic_name for p in publishers)
+    heard = Counter(s.topic_name for s in subscriptions)
+    missing = [
+        p.topic_name
+        for p in publishers
+        if heard[p.topic_name] and p.get_subscription_count() < heard[p.topic_name]
+    ]
+    missing += [
+        s.topic_name
+        for s in subscriptions
+        if sent[s.topic_name] and s.get_publisher_count() < sent[s.topic_name]
+    ]
+    for node in nodes:
+        missing += [c.srv_name for c in node.clients if not c.service_is_ready()]
+        actions = [w for w in node.waitables if isinstance(w, ActionClient)]
+        missing += [f"an action of {node.get_name()}" for a in actions if not a.server_is_ready()]
+    return sorted(set(missing))
 
 
 class Discovery:

@@ -29,7 +29,7 @@ from push_ros.names import Names, space
 from push_ros.pace_feed import pace_known
 from push_ros.process import Spinner, prepare_environment
 from push_scenario.scenario import Scenario
-from push_study.discovery import Discovery, NotDiscovered
+from push_study.discovery import Discovery, NotDiscovered, unmatched
 from push_study.observer import Observer
 
 _ROLES = ("controller", "planner", "supervisor")
@@ -91,7 +91,8 @@ class LockstepRun:
         Parameters
         ----------
         scenario: what planner, controller and supervisor believe.
-        extra: makes further nodes, e.g. a recorder, once ROS is up.
+        extra: makes further nodes, e.g. a recorder, once ROS is up. The run does not begin before
+            every node that has a property ``ready`` says that it is.
         world: what the bridge simulates, when it differs from what is believed.
         quiet: log warnings only.
         system: which nodes, see ``push_bringup.systems``. namespace: of the world.
@@ -186,22 +187,21 @@ class LockstepRun:
         self._stack.close()
 
     def connect(self) -> None:
-        """Wait until all parts know each other; nothing moves before.
+        """Wait until all nodes know each other, further ones included; nothing moves before.
 
-        No clock limits the wait, see ``push_study/discovery.py``.
+        Whatever the nodes subscribe to and publish must have been made before: what is found only
+        while the world steps is found at another tick in each run. No clock limits the wait, see
+        ``push_study/discovery.py``.
 
         Raises
         ------
         NotDiscovered: they will not.
         """
         assert self.spinner is not None
-        teams = list(self.teams.values())
 
         def parts() -> tuple[object, ...]:
             return (
-                *(bool(t.supervisor.ready) for t in teams),
-                *(bool(t.planner.ready) for t in teams),
-                *(t.observer.connected for t in teams),
+                *(bool(getattr(node, "ready", True)) for node in self.nodes),
                 self._recorded(),
                 len(self.bridge.commanded()) >= self._commanded,
                 bool(self.bridge.heard_by(self._listeners)),
@@ -210,8 +210,8 @@ class LockstepRun:
 
         discovery = Discovery(self.observer, self.spinner)
         discovery.wait(
-            lambda: (*parts(), len(self.bridge.commanded()), *self.observer.endpoints()),
-            lambda: all(parts()),
+            lambda: (*parts(), len(self.bridge.commanded()), *unmatched(self.nodes)),
+            lambda: all(parts()) and not unmatched(self.nodes),
         )
         discovery.settle()
 

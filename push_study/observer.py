@@ -61,19 +61,13 @@ class Observer(Node):
             self.destroy_subscription(subscription)
 
     @property
-    def connected(self) -> bool:
+    def ready(self) -> bool:
         """Whether it hears the world and the owner of the goals, who would hear a goal."""
         return (
             self.state is not None
             and self.count_publishers(self._truth_topic) > 0
             and heard(self, self._goal_publisher)
         )
-
-    def endpoints(self) -> tuple[int, int]:
-        """Publishers and subscriptions of the topics that matter for a run, as far as known."""
-        topics = [s.topic_name for s in self.subscriptions] + [self._goal_publisher.topic_name]
-        publishers = sum(int(self.count_publishers(t)) for t in topics)
-        return publishers, sum(int(self.count_subscribers(t)) for t in topics)
 
     def send_goal(self, goal: Array | bytes) -> None:
         """Publish a goal ``(3,)``, or a serialised message, on /goal_pose."""

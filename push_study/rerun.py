@@ -159,11 +159,6 @@ class _Person(Node):
                 if name not in self._clients_of:
                     self._clients_of[name] = self.create_client(KINDS[kind], name)
 
-    @property
-    def ready(self) -> bool:
-        """Whether every service is there."""
-        return all(client.service_is_ready() for client in self._clients_of.values())
-
     def send(self, data: "bytes | Call") -> None:
         """Publish a belief, or call a service."""
         if isinstance(data, bytes):
@@ -236,7 +231,6 @@ def _run_again(run: RunOfBag, scenario: Scenario, world: Scenario, out: Path) ->
     ):
         inputs = _Inputs(run, graph, people[0])
         graph.connect()
-        graph.spin_until(lambda: people[0].ready, math.inf, math.inf)
         inputs.send(begun=False)
         graph.bridge.start()
         writer, bridge = graph.recorder.writer, graph.bridge  # type: ignore[union-attr]

@@ -161,18 +161,20 @@ def _track(task: LineTask) -> Row:
         ACCELERATION,
     )
     with LockstepRun(believed, world=world, quiet=True) as run:
+        robot = believed.robot()[0]
+        client = ActionClient(run.observer, FollowTrajectory, f"/{robot}/follow_trajectory")
         run.start()
-        result = _follow(run, believed, way)
+        result = _follow(run, believed, way, client)
         trace = run.observer.trace
-    robot, item = np.array(trace.robot), np.array(trace.object)
+    ways, item = np.array(trace.robot), np.array(trace.object)
     final = item[-max(1, round(_FINAL * len(item))) :]
     error = float(np.abs(final[:, 1]).mean())
-    in_robot = np.array([se2.between(r, o)[1] for r, o in zip(robot, item, strict=False)])
+    in_robot = np.array([se2.between(r, o)[1] for r, o in zip(ways, item, strict=False)])
     Path(task.out).mkdir(parents=True, exist_ok=True)
     np.savez_compressed(
         task.trace_file,
         time=np.array(trace.time[::10]),
-        robot=robot[::10],
+        robot=ways[::10],
         object=item[::10],
         aside=in_robot[::10],
     )
@@ -194,15 +196,11 @@ def _track(task: LineTask) -> Row:
     }
 
 
-def _follow(run: LockstepRun, scenario: Scenario, way: Trajectory) -> Any:
+def _follow(run: LockstepRun, scenario: Scenario, way: Trajectory, client: ActionClient) -> Any:
     """The controller's result of a push along a trajectory; None where it does not end."""
-    name, robot = scenario.robot()
+    _, robot = scenario.robot()
     item, spec = scenario.object()
     side = push_sides(robot, spec, 1.0)[0]
-    client = ActionClient(run.observer, FollowTrajectory, f"/{name}/follow_trajectory")
-    assert run.spinner is not None
-    if not run.spinner.until(client.server_is_ready, 10.0):
-        raise RuntimeError("the controller does not answer")
     goal = FollowTrajectory.Goal(
         mode=FollowTrajectory.Goal.PUSH,
         object=item,

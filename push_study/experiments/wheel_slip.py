@@ -38,9 +38,11 @@ from push_msgs.action import FollowTrajectory
 from push_msgs.msg import ControllerStatus, Poses
 from push_ros.claims import own_domain
 from push_ros.conversions import poses_from_ros, time_from_ros, trajectory_to_ros
+from push_ros.pace_feed import pace_known
 from push_ros.process import Spinner, prepare_environment
 from push_ros.qos import STATUS, STREAM
 from push_scenario.scenario import Scenario, load_scenario
+from push_study.discovery import Discovery, unmatched
 from push_study.job import digest
 from push_study.pool import Row
 from push_study.study import StudyOptions
@@ -235,16 +237,18 @@ def _follow(task: SlipTask) -> Row:
         bridge: Any = nodes[0]
         spinner = Spinner([*nodes, watcher])
         stack.callback(spinner.close)
-        ready = spinner.until(
-            lambda: (
-                len(bridge.commanded()) == 1
-                and bool(bridge.heard_by(1))
-                and watcher.client.server_is_ready()
-            ),
-            20.0,
+        everyone = [*nodes, watcher]
+        discovery = Discovery(watcher, spinner)
+
+        def parts() -> tuple[bool, ...]:
+            known = all(pace_known(node) for node in everyone)
+            return len(bridge.commanded()) == 1, bool(bridge.heard_by(1)), known
+
+        discovery.wait(
+            lambda: (*parts(), *unmatched(everyone)),
+            lambda: all(parts()) and not unmatched(everyone),
         )
-        if not ready:
-            raise RuntimeError("the nodes did not find each other")
+        discovery.settle()
         bridge.start()
         goal = FollowTrajectory.Goal(trajectory=trajectory_to_ros(way))
         sent = watcher.client.send_goal_async(goal)

@@ -4,9 +4,16 @@ import itertools
 
 import pytest
 import rclpy
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Empty
+from std_srvs.srv import Trigger
 
+from push_ros.claims import own_domain
 from push_ros.process import Spinner
-from push_study.discovery import Discovery, NotDiscovered
+from push_ros.qos import COMMAND
+from push_scenario.scenario import load_scenario
+from push_study.discovery import Discovery, NotDiscovered, unmatched
 from push_study.graph_run import LockstepRun
 from tests.system.test_swarm import running
 
@@ -45,6 +52,56 @@ def test_a_run_whose_owner_is_never_ready_ends_and_says_what_is_missing(monkeypa
         with pytest.raises(NotDiscovered, match="did not find each other"):
             run.connect()
         assert run.bridge.time == 0.0
+
+
+class Late(Node):
+    """A node of a study that is slow to hear what it needs."""
+
+    def __init__(self):
+        super().__init__("late")
+        self.asked = 0
+
+    @property
+    def ready(self):
+        self.asked += 1
+        return self.asked > 25
+
+
+def test_a_run_does_not_begin_before_the_nodes_of_its_study_are_ready():
+    made = []
+
+    def extra():
+        made.append(Late())
+        return made
+
+    with own_domain(), LockstepRun(load_scenario("env1-target1"), extra, quiet=True) as run:
+        run.connect()
+        assert made[0].asked > 25 and run.bridge.time == 0.0
+
+
+def test_what_is_unmatched_is_named_until_it_is_found(ros):
+    """Of two participants: a topic whose ends are never matched, one whose ends will be."""
+    other = rclpy.Context()
+    rclpy.init(args=[], context=other)
+    near, far = rclpy.create_node("near"), rclpy.create_node("far", context=other)
+    near.create_publisher(Empty, "/to_far", COMMAND)
+    far.create_subscription(Empty, "/to_far", lambda m: None, COMMAND)
+    far.create_publisher(Empty, "/to_nobody", COMMAND)
+    unreliable = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    publisher = near.create_publisher(Empty, "/never", unreliable)
+    far.create_subscription(Empty, "/never", lambda m: None, COMMAND)
+    far.create_client(Trigger, "/ask_near")
+    nodes, spinner = [near, far], Spinner([near])
+    try:
+        Discovery(near, spinner).settle()
+        assert set(unmatched(nodes)) - {"/to_far"} == {"/ask_near", "/never"}
+        near.create_service(Trigger, "/ask_near", lambda request, response: response)
+        near.destroy_publisher(publisher)
+        assert spinner.until(lambda: not unmatched(nodes), 20.0), unmatched(nodes)
+    finally:
+        far.destroy_node()
+        spinner.close()
+        rclpy.shutdown(context=other)
 
 
 def few_probes(node, spinner):

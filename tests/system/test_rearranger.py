@@ -48,7 +48,6 @@ class Run:
         self.node = next(n for n in run.nodes if isinstance(n, RearrangerNode))
         self.person = watch.create_publisher(PoseStamped, "/goal_pose", COMMAND)
         run.start()
-        self.until(lambda: watch.ready and self.person.get_subscription_count() > 0)
 
     @property
     def state(self):
