@@ -1,5 +1,6 @@
 """A whole run in one process: every node on one executor, in lockstep, repeatable to the bit."""
 
+import math
 import os
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack, suppress
@@ -32,6 +33,7 @@ from push_scenario.scenario import Scenario
 from push_study.discovery import Discovery, NotDiscovered, unmatched
 from push_study.observer import Observer
 
+_STUCK = 50_000  # spins without a tick, 20 a second or more, after which a run will not go on
 _ROLES = ("controller", "planner", "supervisor")
 
 
@@ -232,12 +234,30 @@ class LockstepRun:
         self.bridge.start()
 
     def spin_until(
-        self, condition: Callable[[], bool], sim_limit: float, wall_limit: float = 600.0
+        self, condition: Callable[[], bool], sim_limit: float, wall_limit: float = math.inf
     ) -> bool:
-        """Spin until the condition holds; False after sim_limit [s] sim time or wall_limit [s]."""
+        """Spin until the condition holds; False after sim_limit [s] sim time or wall_limit [s].
+
+        A study leaves wall_limit alone: how busy the machine is must not decide how a run ends.
+
+        Raises
+        ------
+        RuntimeError: the world does not step any more, however often the nodes are spun.
+        """
         assert self.spinner is not None
-        end = self.bridge.time + sim_limit
-        self.spinner.until(lambda: condition() or self.bridge.time > end, wall_limit)
+        end, tick, spins = self.bridge.time + sim_limit, -1, 0
+
+        def over() -> bool:
+            nonlocal tick, spins
+            if condition() or self.bridge.time > end:
+                return True
+            spins = spins + 1 if tick == self.bridge.tick else 0
+            tick = self.bridge.tick
+            if spins > _STUCK:
+                raise RuntimeError(f"the world stands at tick {tick}: no node goes on with the run")
+            return False
+
+        self.spinner.until(over, wall_limit)
         return condition()
 
     def reach(

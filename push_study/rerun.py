@@ -1,6 +1,5 @@
 """Run the run of a bag again, in lockstep, and say how the two compare."""
 
-import math
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -240,16 +239,16 @@ def _run_again(run: RunOfBag, scenario: Scenario, world: Scenario, out: Path) ->
                 inputs.send()
                 return bool(writer.last > round(1e9 * run.end))
 
-            graph.spin_until(over, run.end + _SETTLE, math.inf)
+            graph.spin_until(over, run.end + _SETTLE)
             return
 
         def ended() -> bool:
             inputs.send()
             return bool(bridge.time >= run.end and inputs.done)
 
-        graph.spin_until(ended, run.end + _PATIENCE, math.inf)
+        graph.spin_until(ended, run.end + _PATIENCE)
         begin = bridge.time
-        graph.spin_until(lambda: bridge.time > begin + _SETTLE, 2.0 * _SETTLE, math.inf)
+        graph.spin_until(lambda: bridge.time > begin + _SETTLE, 2.0 * _SETTLE)
 
 
 def _changes(job: Job) -> list[State]:

@@ -277,7 +277,7 @@ def _run(
                 0, refusal.code, f"refused: {refusal}", 0.0, 0.0, error, watcher.trace, drawn
             )
         node.take_task(task)
-        ended = run.spin_until(lambda: not node.busy, limit, math.inf)
+        ended = run.spin_until(lambda: not node.busy, limit)
         seconds = run.bridge.time - begin
         planner = run.planner
         planning = node.planning_time + float(getattr(planner, "planning_time", 0.0)) * (

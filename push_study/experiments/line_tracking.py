@@ -4,7 +4,6 @@ Each with the printed gains and with ours, because the gains decide how much the
 a controller that steers gently stays within the stable curvatures of its own accord.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -214,7 +213,7 @@ def _follow(run: LockstepRun, scenario: Scenario, way: Trajectory, client: Actio
     if not sent.done() or not sent.result().accepted:
         raise RuntimeError("the controller has rejected the trajectory")
     answer = sent.result().get_result_async()
-    ended = run.spin_until(answer.done, _LIMIT, math.inf)  # no wall clock: the machine may be busy
+    ended = run.spin_until(answer.done, _LIMIT)
     return answer.result().result if ended else None
 
 

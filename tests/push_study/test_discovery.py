@@ -108,13 +108,24 @@ def few_probes(node, spinner):
     return Discovery(node, spinner, probes=20, between=1)
 
 
-def test_no_clock_decides_whether_a_run_connects(monkeypatch):
+def test_no_clock_decides_whether_a_run_connects_or_goes_on(monkeypatch):
     """A machine on which an hour passes from each look at the clock to the next."""
     hours = itertools.count(0.0, 3600.0)
     with running() as run:
         monkeypatch.setattr("time.monotonic", lambda: next(hours))
         run.connect()
         assert run.supervisor.ready and run.bridge.time == 0.0
+        run.start()
+        assert run.spin_until(lambda: run.bridge.time > 0.5, 2.0)
+
+
+def test_a_run_whose_world_stands_ends_and_says_so(monkeypatch):
+    monkeypatch.setattr("push_study.graph_run._STUCK", 50)
+    with running() as run:
+        run.start()
+        run.bridge._paused = True
+        with pytest.raises(RuntimeError, match="the world stands at tick"):
+            run.spin_until(lambda: False, 2.0)
 
 
 def test_a_run_connects_and_steps(monkeypatch):
