@@ -96,13 +96,13 @@ class GroupPushSettings:
         1.0,
         low=0.0,
         high=60.0,
-        doc="Time by which a push ends before the contacts may no longer hold the object (s); "
-        "without effect until the belief changes during the push",
+        doc="A push ends this long before a point at which the contacts may no longer hold the "
+        "object (s); without effect until the belief changes during the push",
     )
     stop_before_slip: bool = bounded(
         True,
-        doc="Whether a push ends before the contacts may no longer hold the object, so that a new "
-        "plan is made; otherwise only the report tells it",
+        doc="Whether a push ends before a point at which the contacts may no longer hold the "
+        "object, so that a new plan is made; otherwise only the report shows it",
     )
     position_noise: float = bounded(
         2e-4,
