@@ -120,8 +120,9 @@ class Reference10:
         pass
 
 
-def cases(kind: Kind, seed: int = 0) -> list[Any]:
+def cases(kind: Kind, seed: int = 0, solver: Any = None, loops: int = LOOPS) -> list[Any]:
     """Consecutive ticks of closed loops at 100 Hz: error, reference, obstacles. seed: other loops.
+    solver: of the controller that closes them.
 
     Easy: near the reference, obstacles far away. Hard: far from the reference, on a bend near the
     curvature limit, obstacles close on both sides. There are always 20 obstacles.
@@ -131,9 +132,9 @@ def cases(kind: Kind, seed: int = 0) -> list[Any]:
     random = np.random.default_rng([first, seed] if seed else first)
     p, h = 20, 0.1
     result = []
-    for _ in range(LOOPS):
+    for _ in range(loops):
         kappa = random.uniform(1.2, 1.7) * random.choice([-1, 1]) if hard else 0.3
-        mpc = kind.make()
+        mpc = kind.make(solver)
         aside = random.uniform(0.01, 0.025) if hard else 0.001
         state = np.array([-0.005, random.choice([-1, 1]) * aside, random.normal() * 0.1 * hard])
         v, omega = 0.05 if hard else 0.07, 0.0

@@ -3,12 +3,18 @@
 import argparse
 from pathlib import Path
 
-from benchmarks import NAMES
+from benchmarks import NAMES, WITH_STEPS
+from planar_push.arguments import whole
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this verb."""
     parser.add_argument("what", nargs="?", default="all", choices=["all", *NAMES])
+    parser.add_argument(
+        "--steps",
+        type=whole(1),
+        help=f"number of control steps of our solver; only for {', '.join(WITH_STEPS)}",
+    )
     parser.add_argument("--out", default="", help="folder for the JSON results")
 
 
@@ -16,4 +22,5 @@ def run(arguments: argparse.Namespace) -> int:
     """0 when every bound holds."""
     from benchmarks import run as run_benchmarks
 
-    return run_benchmarks(arguments.what, Path(arguments.out) if arguments.out else None)
+    out = Path(arguments.out) if arguments.out else None
+    return run_benchmarks(arguments.what, out, arguments.steps)

@@ -23,10 +23,17 @@ class ActiveSetBackend:
     """Starts from the last working set."""
 
     tolerance: float = 1e-8
+    iterations: int = 0
+    """Of the last solve: each adds a row to the working set, or drops one from it."""
     _active: Index = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     _multiplier: Array = field(default_factory=lambda: np.zeros(0))
     _count: int = 0
     _shape: tuple[int, ...] = ()
+
+    @property
+    def working_set(self) -> Index:
+        """Numbers of the constraints that the next solve tries first."""
+        return self._active[: self._count]
 
     def solve(self, qp: Qp) -> QpSolution:
         """See QpBackend."""
@@ -35,7 +42,7 @@ class ActiveSetBackend:
             self._shape, self._count = (n, *qp.bound.shape), 0
             self._active, self._multiplier = np.zeros(n, np.int64), np.zeros(n)
         z = np.empty(n)
-        status, iterations, self._count = goldfarb_idnani.solve(
+        status, self.iterations, self._count = goldfarb_idnani.solve(
             qp.H,
             qp.f,
             qp.low,
@@ -58,7 +65,7 @@ class ActiveSetBackend:
         if not solved:
             self.reset()
         return QpSolution(
-            z, solved, f"{goldfarb_idnani.WORDS[status]} after {iterations} iterations"
+            z, solved, f"{goldfarb_idnani.WORDS[status]} after {self.iterations} iterations"
         )
 
     def reset(self) -> None:

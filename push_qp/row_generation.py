@@ -60,6 +60,7 @@ class RowGeneration:
         self._solver = solver
         self._every_row = every_row
         self._shape: tuple[int, ...] = ()
+        self.rounds = 0  # of the last solve: how often the solver was called
         self.reset()
 
     def reset(self) -> None:
@@ -93,12 +94,14 @@ class RowGeneration:
         kernels.write_rows(*shape, numbers, self._G, self._b)
         z, known = self._z, self._known
         box, row = (self._box, self._row) if known else (np.zeros(n), np.zeros(len(self._row)))
+        self.rounds = 0
         while True:  # terminates: each round adds rows, and their number is finite
             index = self._numbers[:count]
             G, b = self._G[:count], self._b[:count]
             if not (np.isfinite(G).all() and np.isfinite(b).all()):
                 return self._failed(np.full(n, np.nan), "a row is not finite")
             guess = np.concatenate([box, row[index]])
+            self.rounds += 1
             result = self._solver.solve(qp, G, b, qp.equalities(index), z, guess, known)
             if not (result.solved and bool(np.isfinite(result.z).all())):
                 return self._failed(result.z, result.status)
