@@ -24,6 +24,8 @@ class Traced:
         self.cold: list[bool] = []
         self.optimal: set[int] = set()
         """A hash of each working set that was optimal."""
+        self.error = 0.0
+        """Greatest deviation of an answer from the conditions of optimality, see ``deviation``."""
 
     def solve(self, qp: Qp) -> QpSolution:
         """See QpBackend. Each iteration adds a row to the working set, or drops one from it."""
@@ -38,11 +40,34 @@ class Traced:
         self.dropped.append((solver.iterations - inequalities) // 2 if result.solved else 0)
         if result.solved:
             self.optimal.add(hash(final.tobytes()))
+            error = deviation(qp, result.z, solver.working_set, solver.multipliers)
+            self.error = max(self.error, error)
         return result
 
     def reset(self) -> None:
         """See QpBackend."""
         self._solver.reset()
+
+
+def deviation(qp: Qp, z: np.ndarray, working: np.ndarray, multipliers: np.ndarray) -> float:
+    """From the conditions of Karush, Kuhn and Tucker, which prove that z is optimal.
+
+    The greatest of: violation of a constraint, distance from a constraint of the working set (both
+    in its own unit), and, as fractions of the largest entry of f, the gradient of the Lagrangian
+    and the negative part of a multiplier of an inequality.
+    """
+    n, box = len(qp.f), working < 2 * len(qp.f)
+    rows = working[~box] - 2 * n
+    G, b = qp.rows(rows)
+    gradient = qp.H @ z + qp.f
+    gradient += multipliers[~box] @ G
+    side, prices = working[box], multipliers[box]
+    at, upper = side % n, side >= n
+    np.add.at(gradient, at, np.where(upper, prices, -prices))
+    apart = np.concatenate([G @ z - b, z[at] - np.where(upper, qp.high[at], qp.low[at])])
+    signed = np.concatenate([multipliers[~box][~qp.equalities(rows)], prices])
+    dual = max(np.abs(gradient).max(), -signed.min(initial=0.0)) / np.abs(qp.f).max()
+    return float(max(qp.violation(z), np.abs(apart).max(initial=0.0), dual))
 
 
 def summary(trace: Traced, alone: np.ndarray) -> tuple[dict[str, Any], str]:
@@ -52,7 +77,7 @@ def summary(trace: Traced, alone: np.ndarray) -> tuple[dict[str, Any], str]:
     added = iterations - dropped
     longest = np.argsort(iterations)[-max(10, len(iterations) // 1000) :]
     each = float(alone[longest].sum() / max(1, iterations[longest].sum()))
-    each = each if iterations.max() >= _MANY else float("nan")
+    many = bool(iterations.max() >= _MANY)
     edges = [*_EDGES, np.inf]
     bins = {
         f"{a}" if b == a + 1 else f"{a}-{b - 1:.0f}": int(count)
@@ -69,8 +94,9 @@ def summary(trace: Traced, alone: np.ndarray) -> tuple[dict[str, Any], str]:
         "longest_at": _place(int(iterations.argmax())),
         "histogram": np.bincount(iterations).tolist(),
         "optimal_working_sets": len(trace.optimal),
-        "iteration_s": each,
-        "cap_s": each * trace.cap,
+        "error": trace.error,
+        "iteration_s": each if many else None,
+        "cap_s": each * trace.cap if many else None,
     }
     lines = [
         f"{name:24s} {_told(values)}"
@@ -83,11 +109,10 @@ def summary(trace: Traced, alone: np.ndarray) -> tuple[dict[str, Any], str]:
         )
     ]
     lines.append("steps by iterations      " + ", ".join(f"{k}: {v}" for k, v in bins.items()))
-    lines.append(
-        f"cap {trace.cap}: about {1e3 * figures['cap_s']:.1f} ms, at the {1e6 * each:.2f} us an "
-        "iteration of the longest solves"
-    )
+    cost = f": about {1e3 * each * trace.cap:.1f} ms, at {1e6 * each:.2f} us an iteration of the"
+    lines.append(f"cap {trace.cap}{cost + ' longest solves' if many else ''}")
     lines.append(f"different working sets that were optimal: {len(trace.optimal)}")
+    lines.append(f"conditions of optimality met to {trace.error:.1e}")
     return figures, "\n".join(f"    {line}" for line in lines)
 
 

@@ -124,6 +124,7 @@ def run(steps: int = STEPS) -> dict[str, Any]:
             print(f"    ours failed: {where}: {reason}")
         result[f"{label} iterations"] = figures
         bounds[f"{label}: failed solves of ours"] = at_most(len(ours.failed), 0)
+        bounds[f"{label}: optimality of ours, deviation"] = at_most(trace.error, 1e-7)
         bounds[f"{label}: iterations of ours / their cap"] = at_most(
             figures["iterations"]["max"] / trace.cap, 0.5
         )

@@ -35,6 +35,11 @@ class ActiveSetBackend:
         """Numbers of the constraints that the next solve tries first."""
         return self._active[: self._count]
 
+    @property
+    def multipliers(self) -> Array:
+        """Of the constraints of the working set, at the last solution."""
+        return self._multiplier[: self._count]
+
     def solve(self, qp: Qp) -> QpSolution:
         """See QpBackend."""
         n = len(qp.f)

@@ -79,6 +79,9 @@ def test_every_verb_has_words_and_says_what_it_does():
         (["play", "BAG"], "no .mcap file"),
         (["play", "BAG", "--factor", "0"], "positive"),
         (["recover", "NOWHERE", "--out", "OUT"], "NOWHERE"),
+        (["bench", "solvers", "--steps", "0"], "at least 1"),
+        (["bench", "mpc", "--steps", "100", "--out", "OUT"], "for bench solvers only"),
+        (["bench", "--steps", "100"], "for bench solvers only"),
     ],
 )
 def test_wrong_words_end_with_2_before_anything_starts(
