@@ -285,10 +285,13 @@ def solve(
                         floor = max(floor, 1e-10 * dot(JT[:, c], JT[:, c]))
                 weighed, chosen = True, -1
         right = _normal_form(chosen, n, low, high, S, g, width, normal, bound, family, row)
+        violation = dot(row, z) - right
+        if violation <= tolerance and not exact:  # it seemed violated: room has gathered errors
+            stale = True
+            continue
         # 2. towards it, dropping constraints whose multipliers would turn negative
         for i in range(n):
             d[i] = -dot(JT[i], row)
-        violation = dot(row, z) - right
         added = 0.0
         while True:
             iterations += 1
