@@ -13,7 +13,8 @@ def iteration_limit(qp: Qp) -> int:
     """Limit of the iterations of a solve: ten per unknown and one per row.
 
     One to two iterations per active row are normal, and there are no more active rows than
-    unknowns. A start from an unrelated working set may take two or three times as many.
+    unknowns. A start from an unrelated working set may take two or three times as many. No proof
+    keeps a solve below the limit (docs/single-robot.md); at the limit it fails.
     """
     return 10 * len(qp.f) + int(qp.bound.size)
 

@@ -5,6 +5,7 @@ iteration adds a row to the working set, or drops one. The states after an added
 one, are the solutions of subproblems; the proof is about their costs.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -152,6 +153,25 @@ def test_it_ends_with_infeasible_where_nothing_is_feasible(seed, n, m):
     never = np.vstack([G, -G[:1]]), np.append(b, -b[0] - 0.1)
     result = ActiveSetBackend().solve(Qp.dense(qp.H, qp.f, *never, qp.low, qp.high))
     assert not result.solved and "infeasible" in result.status
+
+
+@pytest.mark.parametrize(("label", "working_sets"), [("hard", 68), ("forces", 155)])
+def test_the_proven_bounds_are_of_no_use(label, working_sets):
+    """The powers of ten that docs/single-robot.md tells, and what is needed in fact."""
+    kind, powers = kinds()[label], []
+    for case in ticks(kind, 3, None, 4)[::25]:
+        qp, solver = kind.make().programme(case[0], case[1], kind.contact, case[2]), Traced()
+        result = solver.solve(qp)
+        n, (G, _) = len(qp.f), qp.rows(qp.all_rows())
+        sets = sum(math.comb(2 * n + len(G), k) for k in range(n + 1))
+        assert round(math.log10(2 * sets)) == working_sets
+        inverse = np.linalg.inv(qp.H)
+        w = max(np.einsum("ij,jk,ik->i", G, inverse, G).max(), np.diag(inverse).max())
+        first, best = -inverse @ qp.f, result.z
+        rise = 0.5 * best @ qp.H @ best + qp.f @ best - 0.5 * qp.f @ first
+        powers.append(math.log10(4.0 * w * rise / 1e-16))
+        assert solver.iterations[0] < 0.3 * solver.cap
+    assert min(powers) > 20 and max(powers) < 25
 
 
 @pytest.mark.parametrize("cap", [0, 1, 3, 10, 20])

@@ -13,8 +13,8 @@ MODULES = {"proxqp": "proxsuite"}
 @pytest.mark.parametrize("name", RIVALS)
 @pytest.mark.parametrize("label", ["easy", "hard", "forces"])
 def test_its_first_input_is_ours(name, label):
-    """40 steps of closed loops, without history; forces: with equality rows. Their tolerance is
-    1e-6 of rows and duals, ours is exact, so inputs differ by a little."""
+    """40 steps of closed loops, without history; forces: with contact forces as unknowns. Their
+    tolerance is 1e-6 of rows and duals, ours is exact, so inputs differ by a little."""
     pytest.importorskip(MODULES.get(name, name))
     assert agreement(kinds()[label], name, 40) < 5e-3
 
