@@ -103,7 +103,12 @@ def trial(task: PaperTask) -> Row:
     count = int(task.scenario.split("-")[1])
     begin = starts(np.random.default_rng([task.seed, count]), count)
     room = EnvironmentSpec((ROOM, ROOM), resolution=0.05)
-    settings = {"position_tolerance": _REACHED, "orientation": False, "seed": task.seed}
+    settings = {
+        "position_tolerance": _REACHED,
+        "orientation": False,
+        "stalled": _LIMIT,
+        "seed": task.seed,
+    }
     start = np.array(START)
     scenario = made_scenario(
         task.scenario, room, hero(), begin, _OBJECT, start, {"gibbs": settings}

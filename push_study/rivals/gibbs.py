@@ -15,9 +15,9 @@ import math
 
 import numpy as np
 
+from push_job.open_room import OpenRoom, open_room_method
 from push_model import se2
 from push_model.arrays import Array, Mask
-from push_study.rivals.rival import RivalArena, rival_spec
 
 _SENSING, _SAFE, _MASS, _LARGEST = 0.5, 0.15, 5.0, 0.3
 _STEP, _PERIOD = 0.01, 1.0 / 15.0  # [s] by which samples look ahead; between decisions
@@ -36,14 +36,14 @@ _LOST = 1e4
 class Gibbs:
     """See the module."""
 
-    def __init__(self, arena: RivalArena) -> None:
+    def __init__(self, arena: OpenRoom) -> None:
         self._arena = arena
         self._random = np.random.default_rng(arena.seed)
         self._next = -math.inf
         self._drawn = np.zeros((0, 2))  # in their units, as long as all that follows
 
     def velocities(self, time: float, pose: Array, robots: Array) -> Array:
-        """See Rival."""
+        """See VelocityLaw."""
         faster = self._arena.speed / _STRAIGHT
         if len(self._drawn) != len(robots):
             self._drawn = np.full((len(robots), 2), _LARGEST)  # as their robots begin
@@ -197,4 +197,4 @@ def _saturated(v: Array, most: float) -> Array:
     return slowed
 
 
-METHOD = rival_spec("gibbs", Gibbs)
+METHOD = open_room_method("gibbs", Gibbs)

@@ -17,8 +17,8 @@ import math
 
 import numpy as np
 
+from push_job.open_room import OpenRoom, open_room_method
 from push_model.arrays import Array
-from push_study.rivals.rival import RivalArena, rival_spec
 
 _CELLS, _SWEEPS, _DISCOUNT = 20, 200, 0.97
 _KP, _KD = 4.0, 1.0
@@ -31,7 +31,7 @@ _MOVES = np.array([[0, 1], [1, 1], [1, 0], [1, -1], [0, -1], [-1, -1], [-1, 0], 
 class GlobalInput:
     """See the module."""
 
-    def __init__(self, arena: RivalArena) -> None:
+    def __init__(self, arena: OpenRoom) -> None:
         self._arena, self._unit = arena, 2.0 * arena.radius
         outline = arena.item.geometry.outline
         self._reach = float(np.hypot(*outline.T).max())
@@ -43,7 +43,7 @@ class GlobalInput:
         self._still: tuple[float, Array] | None = None
 
     def velocities(self, time: float, pose: Array, robots: Array) -> Array:
-        """See Rival."""
+        """See VelocityLaw."""
         points = robots[:, :2]
         mean = points.mean(axis=0)
         variance = float(points.var(axis=0).sum()) / self._unit**2
@@ -148,4 +148,4 @@ class GlobalInput:
         return best
 
 
-METHOD = rival_spec("global-input", GlobalInput)
+METHOD = open_room_method("global-input", GlobalInput)

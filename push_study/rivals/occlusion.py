@@ -13,10 +13,10 @@ import math
 
 import numpy as np
 
+from push_job.open_room import OpenRoom, open_room_method
 from push_model import se2
 from push_model.arrays import Array, Mask
 from push_model.outlines import distance, inside
-from push_study.rivals.rival import RivalArena, rival_spec
 
 _AT = 0.1  # [m] from the object: at it
 _NEAR, _KEEP = 0.04, 0.2  # [m] between which a robot that moves along it stays
@@ -28,7 +28,7 @@ _DT = 0.02
 class Occlusion:
     """See the module."""
 
-    def __init__(self, arena: RivalArena) -> None:
+    def __init__(self, arena: OpenRoom) -> None:
         self._arena = arena
         self._outline = outline = arena.item.geometry.outline
         following = np.roll(outline, -1, axis=0)
@@ -41,7 +41,7 @@ class Occlusion:
         self._side = np.zeros(0)
 
     def velocities(self, time: float, pose: Array, robots: Array) -> Array:
-        """See Rival."""
+        """See VelocityLaw."""
         points, n = robots[:, :2], len(robots)
         if len(self._since) != n:
             self._since, self._walking = np.full(n, math.inf), np.full(n, -math.inf)
@@ -88,4 +88,4 @@ class Occlusion:
         return clear
 
 
-METHOD = rival_spec("occlusion", Occlusion)
+METHOD = open_room_method("occlusion", Occlusion)

@@ -55,9 +55,13 @@ def run(task: RivalTask) -> Row:
     begin = scattered(random, task.robots, FreeSpace(rasterise(room)), outline, radius)
     ours = task.method in OURS
     system = "swarm" if ours else task.method
-    parameters: dict[str, object] = {"position_tolerance": REACHED, "orientation": False}
+    parameters: dict[str, object] = {
+        "position_tolerance": REACHED,
+        "orientation": False,
+        "stalled": task.limit,
+    }
     if ours:
-        parameters |= {"stalled": task.limit, "law": {"law": task.method}}
+        parameters["law"] = {"law": task.method}
     else:
         parameters["seed"] = task.seed
     scenario = made_scenario(task.scenario, room, robot, begin, item, start, {system: parameters})

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from push_job.open_room import OpenRoom
 from push_model import se2
 from push_model.outlines import distance, inside
 from push_scenario.bodies import load_object
@@ -12,13 +13,12 @@ from push_study.experiments import swarm_rivals
 from push_study.rivals.gibbs import Gibbs, _reach
 from push_study.rivals.global_input import GlobalInput
 from push_study.rivals.occlusion import Occlusion
-from push_study.rivals.rival import RivalArena
 from push_study.study import StudyOptions
 from push_study.swarm.contest import RIVALS, TARGET, RivalTask, run
 from push_study.swarm.figures import draw_figures
 
 SQUARE = load_object("transport_square")
-ARENA = RivalArena((3.0, 3.0), SQUARE, 0.05, 0.128, np.array(TARGET), 1)
+ARENA = OpenRoom((3.0, 3.0), SQUARE, 0.05, 0.128, np.array(TARGET), 1)
 HERE = np.array([-0.7, -0.7, 0.0])
 
 
@@ -64,7 +64,7 @@ def test_the_random_field_draws_robots_to_the_object_where_it_hides_the_target()
     robots = np.array([[*(HERE[:2] - 0.40 * toward), 0.25 * math.pi]])
     gone = []
     for seed in range(20):
-        rival = Gibbs(RivalArena((3.0, 3.0), SQUARE, 0.05, 0.128, np.array(TARGET), seed))
+        rival = Gibbs(OpenRoom((3.0, 3.0), SQUARE, 0.05, 0.128, np.array(TARGET), seed))
         gone.append(rival.velocities(0.0, HERE, robots)[0])
     assert np.mean(np.array(gone) @ toward) > 0.02
     assert np.hypot(*np.array(gone).T).max() <= 0.128 + 1e-9

@@ -1,4 +1,8 @@
-"""Rivals as methods: each is a file that says how robots move; the rest is the same for all."""
+"""Hosts a law that gives robots velocities: one position after another, in an open room.
+
+The rivals of the studies and the swarm with own sensing are such laws. Each is a file that says how
+robots move; the rest is the same for all.
+"""
 
 import math
 from collections.abc import Callable, Mapping
@@ -17,11 +21,12 @@ from push_model.specs import ObjectSpec
 
 _LEAD = 0.025  # [m] of the point ahead of the axle that is driven
 _STEP = 0.02  # [s] between decisions, as in the published simulations
+_CLOSER = 5e-3  # [m] that the object must come closer for it to count as progress
 
 
 @settings
-class RivalSettings:
-    """What all rivals have."""
+class OpenRoomSettings:
+    """What all laws in an open room have."""
 
     position_tolerance: float = bounded(
         0.1,
@@ -34,12 +39,18 @@ class RivalSettings:
         doc="Whether the headings of goals matter. It must be false, because this method controls "
         "only positions.",
     )
+    stalled: float = bounded(
+        120.0,
+        low=1.0,
+        high=3600.0,
+        doc="Time without the object coming closer to its target after which the job fails (s).",
+    )
     seed: int = bounded(0, low=0, high=2**31 - 1, doc="Seed of the random numbers of this method.")
 
 
 @dataclass(frozen=True)
-class RivalArena:
-    """Where a rival works.
+class OpenRoom:
+    """Where a law works.
 
     size: [m] of a room about the origin. item: the object. radius [m], speed [m/s]: of the robots.
     target ``(2,)`` [m]. seed: of what it draws.
@@ -53,7 +64,7 @@ class RivalArena:
     seed: int
 
 
-class Rival(Protocol):
+class VelocityLaw(Protocol):
     """Moves robots that go in any direction."""
 
     def velocities(self, time: float, pose: Array, robots: Array) -> Array:
@@ -62,18 +73,19 @@ class Rival(Protocol):
         ...
 
 
-class RivalMethod:
-    """Hosts a rival: takes positions, one after another, in an open room."""
+class OpenRoomMethod:
+    """A method whose robots move as a law says."""
 
-    def __init__(self, name: str, make: Callable[[RivalArena], Rival], arena: Arena) -> None:
+    def __init__(self, name: str, make: Callable[[OpenRoom], VelocityLaw], arena: Arena) -> None:
         self._name, self._make, self._arena = name, make, arena
-        self._settings = arena.section("", RivalSettings)
-        self._rival: Rival | None = None
+        self._settings = arena.section("", OpenRoomSettings)
+        self._law: VelocityLaw | None = None
         self._targets: tuple[Array, ...] = ()
         self._index, self._code = 0, JobError.NONE
         self._reason, self._busy = "waiting for a goal", False
         self._next = -math.inf
         self._held = np.zeros((0, 2))
+        self._nearest, self._closer = math.inf, math.nan
 
     @property
     def status(self) -> Status:
@@ -85,7 +97,7 @@ class RivalMethod:
         return Status(int(phase), phase.name, self._reason, int(self._code), progress, index, count)
 
     def assess(self, task: Task, belief: Belief, seen: Seen | None) -> Certificate | Refusal:
-        """See Method: a rival takes positions only."""
+        """See Method: positions only."""
         if task.times or not all(math.isnan(t[2]) for t in task.targets):
             text = f"the method '{self._name}' takes positions, without headings or times"
             return Refusal(JobError.INVALID_GOAL, text)
@@ -104,8 +116,9 @@ class RivalMethod:
         item = belief.object(self._arena.object)
         self._reason = f"target {self._index + 1} of {len(self._targets)}"
         self._next, self._held = -math.inf, np.zeros((0, 2))
-        self._rival = self._make(
-            RivalArena(
+        self._nearest, self._closer = math.inf, math.nan
+        self._law = self._make(
+            OpenRoom(
                 (x1 - x0 - inner, y1 - y0 - inner),
                 item,
                 robot.footprint_radius,
@@ -125,19 +138,28 @@ class RivalMethod:
                 self.end(JobError.NONE, f"at the goal: {1e3 * away:.0f} mm")
                 return Told()
             self._aim(belief)
-        if not names or self._rival is None:
+        if not self._progresses(seen.time, away):
+            text = f"the object has not come closer for {self._settings.stalled:g} s"
+            self.end(JobError.EXECUTION_FAILED, text)
+        if not names or self._law is None:
             return Told()
         robot, robots = self._arena.robot, np.array([seen.robots[n] for n in names])
         if seen.time >= self._next - 1e-9 or len(self._held) != len(robots):
             self._next = seen.time + _STEP
             pose = belief.object(self._arena.object).mass_pose(seen.object)
-            chosen = self._rival.velocities(seen.time, pose, robots)
+            chosen = self._law.velocities(seen.time, pose, robots)
             fast = np.hypot(*chosen.T) / robot.max_speed
             self._held = chosen / np.maximum(fast, 1.0)[:, None]
         told = self._held
         if robot.kinematics is not None:
             told = robot.kinematics.follow(told, robots[:, 2], _LEAD)
         return Told({n: (float(a), float(b)) for n, (a, b) in zip(names, told, strict=True)})
+
+    def _progresses(self, now: float, away: float) -> bool:
+        if math.isnan(self._closer) or away < self._nearest - _CLOSER:
+            self._nearest, self._closer = away, now
+        limit: float = self._settings.stalled
+        return now - self._closer <= limit
 
     def report(self, seen: Seen) -> Report | None:
         """See Method."""
@@ -150,10 +172,10 @@ class RivalMethod:
     def end(self, code: JobError, reason: str) -> None:
         """See Method."""
         if self._busy:
-            self._busy, self._code, self._reason, self._rival = False, code, reason, None
+            self._busy, self._code, self._reason, self._law = False, code, reason, None
 
     def revive(self) -> None:
-        """See Method: a rival does not know which robots fail."""
+        """See Method: a law does not know which robots fail."""
 
     def release(self) -> frozenset[str]:
         """See Method."""
@@ -172,6 +194,6 @@ class RivalMethod:
         return {"target": f"{self._index + 1} of {len(self._targets)}"}
 
 
-def rival_spec(name: str, make: Callable[[RivalArena], Rival]) -> MethodSpec:
-    """The row of a rival."""
-    return MethodSpec(name, lambda arena: RivalMethod(name, make, arena), {"": RivalSettings})
+def open_room_method(name: str, make: Callable[[OpenRoom], VelocityLaw]) -> MethodSpec:
+    """The row of a method whose law has no settings of its own."""
+    return MethodSpec(name, lambda arena: OpenRoomMethod(name, make, arena), {"": OpenRoomSettings})
