@@ -70,6 +70,14 @@ ENTRIES = (
         "the thesis, Algorithms 1 and 2",
         {"one-robot": {"planner": {"planner": "thesis"}}},
     ),
+    Entry(
+        "NMPC",
+        "stable-nmpc",
+        _ALL,
+        frozenset({POSES}),
+        "Tang et al., RA-L 2023",
+        reconstructed=True,
+    ),
     Entry("group", "group", _ALL, frozenset({PLATES})),
     Entry(
         "printed group law",
