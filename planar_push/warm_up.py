@@ -76,15 +76,19 @@ def _methods() -> None:
     from grasp_opt.group_method import GROUP
     from grasp_opt.warm_up import warm_up
     from push_scenario.scenario import load_scenario
+    from swarm_push.own_sensing import METHOD as OWN_SENSING
     from swarm_push.swarm_method import SWARM
 
     group = load_scenario("group-ellipse")
     warm_up(group.object()[1], group.robot()[1])
     for method, name in ((GROUP, "group-ellipse"), (SWARM, "swarm-square"), (SWARM, "swarm-walls")):
         _begin(method, load_scenario(name))
+    _begin(OWN_SENSING, load_scenario("swarm-square"), turned=False)
 
 
-def _begin(method: "MethodSpec", scenario: "Scenario") -> None:
+def _begin(method: "MethodSpec", scenario: "Scenario", turned: bool = True) -> None:
+    import numpy as np
+
     from push_job.method import Arena, Seen, Task
     from push_model.belief import Belief
 
@@ -95,7 +99,7 @@ def _begin(method: "MethodSpec", scenario: "Scenario") -> None:
     made = method.make(Arena(scenario.grid, robots, item, spec))
     goal = scenario.goal
     assert goal is not None
-    task = Task((goal,))
+    task = Task((goal if turned else np.array([*goal[:2], np.nan]),))
     for k in range(_STEPS):
         seen = Seen(0.01 * k, scenario.objects[item][1], places)
         if k == 0:

@@ -36,6 +36,7 @@ ENTRIES = (
         "the thesis, (4.1)-(4.8) with its errata",
         {"swarm": {"law": {"law": "thesis"}}},
     ),
+    Entry("own sensing", "own-sensing", _SENSING, frozenset({POSITIONS})),
     Entry(
         "global input",
         "global-input",
