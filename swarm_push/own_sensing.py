@@ -53,4 +53,5 @@ METHOD = MethodSpec(
     _method,
     {"": OpenRoomSettings, "law": LocalLawSettings, "sensor": RobotSensorSettings},
     check_team,
+    "own-sensing",
 )

@@ -29,6 +29,7 @@ RUNS = (
     ("group", "group-ellipse", ("group-ellipse.png", "group-ellipse.gif")),
     ("swarm", "swarm-square", ("swarm-square.gif",)),
     ("swarm", "swarm-walls", ("swarm-walls.gif",)),
+    ("own-sensing", "own-sensing", ("own-sensing.gif",)),
 )
 """System, scenario, and the pictures that are made of its run: of its whole path, or moving."""
 

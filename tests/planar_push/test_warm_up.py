@@ -49,6 +49,7 @@ def test_after_it_nothing_is_compiled():
         ("group-ellipse", "group"),
         ("swarm-square", "swarm"),
         ("swarm-walls", "swarm"),
+        ("own-sensing", "own-sensing"),
     ):
         assert pushed(name, method, 20.0).phase > 0
         assert sorted(compiled() - before) == [], name
