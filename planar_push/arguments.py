@@ -1,15 +1,36 @@
 """Arguments that several commands share, with their checks."""
 
 import argparse
+import ast
 import math
 import signal
 import sys
+import textwrap
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from push_bringup.job_result import JobEvent
 from push_bringup.systems import SYSTEMS, system_names, system_of
+
+
+def describe(parser: argparse.ArgumentParser, folder: Path, known: Iterable[str]) -> None:
+    """List modules of a folder below the help, with the first paragraphs of their docstrings. Names
+    have dashes. No module is imported."""
+    lines = ["NAME:"]
+    for name in known:
+        source = (folder / f"{name.replace('-', '_')}.py").read_text()
+        words = (ast.get_docstring(ast.parse(source)) or "").split("\n\n")[0]
+        filled = textwrap.fill(
+            words,
+            96,
+            initial_indent=" " * 24,
+            subsequent_indent=" " * 24,
+            break_on_hyphens=False,
+        )
+        lines.append(f"  {name:21s} {filled.lstrip()}")
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = "\n".join(lines)
 
 
 def add_scenario(parser: argparse.ArgumentParser, default: str | None = "env1-target1") -> None:

@@ -4,12 +4,21 @@ import argparse
 from pathlib import Path
 
 from benchmarks import NAMES, WITH_STEPS
-from planar_push.arguments import whole
+from planar_push.arguments import describe, whole
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this verb."""
-    parser.add_argument("what", nargs="?", default="all", choices=["all", *NAMES])
+    choices = ["all", *NAMES]
+    parser.add_argument(
+        "what",
+        nargs="?",
+        default="all",
+        choices=choices,
+        metavar="NAME",
+        help="one of those below; default: all",
+    )
+    describe(parser, Path(__file__).resolve().parents[1] / "benchmarks", NAMES)
     parser.add_argument(
         "--steps",
         type=whole(1),

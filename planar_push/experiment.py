@@ -3,14 +3,15 @@
 import argparse
 from pathlib import Path
 
-from planar_push.arguments import add_study, names, study_folder, whole
+from planar_push.arguments import add_study, describe, names, study_folder, whole
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this verb."""
     folder = Path(__file__).resolve().parents[1] / "push_study" / "experiments"
     known = sorted(p.stem.replace("_", "-") for p in folder.glob("[a-z]*.py"))
-    parser.add_argument("name", metavar="NAME", help=f"one of: {', '.join(known)}")
+    parser.add_argument("name", metavar="NAME", help="one of those below")
+    describe(parser, folder, known)
     parser.add_argument(
         "--scenarios", default="", help="comma-separated scenarios; default: those of the study"
     )

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import rclpy
 
+from benchmarks import NAMES
 from planar_push import arguments
 from planar_push.main import main, parser, verbs
 from push_bringup import launcher
@@ -14,6 +15,7 @@ from push_msgs.msg import Poses
 from push_ros.conversions import poses_to_ros
 from push_ros.qos import STREAM
 from push_scenario.scenario import config_directory
+from push_study.study import experiment_names
 
 
 @pytest.fixture
@@ -44,6 +46,16 @@ def test_every_verb_has_words_and_says_what_it_does():
         with pytest.raises(SystemExit) as refusal:
             main([name.replace("_", "-"), "--help"])
         assert refusal.value.code == 0
+
+
+def test_help_says_what_each_benchmark_and_each_study_is_for(capsys):
+    for verb, known in (("bench", NAMES), ("experiment", experiment_names())):
+        with pytest.raises(SystemExit):
+            main([verb, "--help"])
+        lines = capsys.readouterr().out.splitlines()
+        for name in known:
+            (line,) = [at for at in lines if at.startswith(f"  {name} ")]
+            assert len(line.removeprefix(f"  {name}").split()) >= 4, line
 
 
 @pytest.mark.parametrize(
