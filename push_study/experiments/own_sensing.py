@@ -35,9 +35,9 @@ class Condition:
 
 CONDITIONS = {
     "default": Condition(20, {}),
-    "range-1.0": Condition(20, {"range": 1.0}),
-    "range-0.75": Condition(20, {"range": 0.75}),
-    "range-0.5": Condition(20, {"range": 0.5}),
+    "range-1m": Condition(20, {"range": 1.0}),
+    "range-75cm": Condition(20, {"range": 0.75}),
+    "range-50cm": Condition(20, {"range": 0.5}),
     "errors-3": Condition(
         20, {"distance_error": 0.03, "least_error": 3e-3, "odometry_error": 0.06}
     ),
