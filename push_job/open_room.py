@@ -37,13 +37,13 @@ class OpenRoomSettings:
     orientation: bool = bounded(
         False,
         doc="Whether the headings of goals matter. It must be false, because this method controls "
-        "only positions.",
+        "only positions. If it is true, goals with a heading are refused.",
     )
     stalled: float = bounded(
         120.0,
         low=1.0,
         high=3600.0,
-        doc="Time without the object coming closer to its target after which the job fails (s).",
+        doc="Time after which the job fails if the object has come no closer to its target (s).",
     )
     seed: int = bounded(0, low=0, high=2**31 - 1, doc="Seed of the random numbers of this method.")
 

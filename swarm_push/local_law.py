@@ -52,47 +52,52 @@ class LocalLawSettings:
         0.2,
         low=0.0,
         high=1.0,
-        doc="Lowest push speed as a fraction of the robot's maximum speed (dimensionless)",
+        doc="Lowest push speed near the target as a fraction of the robot's maximum speed "
+        "(dimensionless)",
     )
     least: float = bounded(
         0.3,
         low=0.0,
         high=0.99,
-        doc="Lowest cosine of the angle between the direction to the target and the inward normal "
-        "of the outline at which a robot pushes (dimensionless)",
+        doc="A robot pushes if the cosine of the angle between the push direction (from the "
+        "object's centre to the target) and the inward normal of the outline is above this value "
+        "(dimensionless)",
     )
     gain: float = bounded(
         3.0,
         low=0.01,
         high=100.0,
-        doc="Speed of a pushing robot towards the object, divided by the gap between them (1/s)",
+        doc="Speed towards the object that is added to the push speed, divided by the gap between "
+        "robot and object; a constant 1 cm/s is added as well (1/s)",
     )
     shift: float = bounded(
         0.3,
         low=0.0,
         high=100.0,
-        doc="Speed of a robot in contact along the outline, divided by its distance from the "
-        "middle between its neighbours (1/s)",
+        doc="Speed along the outline of a robot that is in contact, divided by its distance from "
+        "the middle between its neighbours (1/s)",
     )
     spread: float = bounded(
         2.0,
         low=0.0,
         high=100.0,
-        doc="The same of a robot behind the object that is not in contact (1/s)",
+        doc="Speed along the outline of a robot that is behind the object but not in contact, "
+        "divided by its distance from the middle between its neighbours (1/s)",
     )
     turn: float = bounded(
         0.3,
         low=0.0,
         high=10.0,
         doc="Angular velocity at which a robot turns the object, divided by the sine of the angle "
-        "between its push and the inward normal (rad/s)",
+        "between the push direction and the inward normal of the outline (rad/s)",
     )
     drift: float = bounded(
         4.0,
         low=0.0,
         high=100.0,
-        doc="Fraction by which a robot slows down whose side makes the object drift sideways, "
-        "divided by the drift as a fraction of the maximum speed (dimensionless)",
+        doc="A robot slows down if the side under its push makes the object drift sideways. This "
+        "is the fraction by which it slows down, divided by the drift speed as a fraction of the "
+        "robot's maximum speed and by the sideways part of the side's normal (dimensionless)",
     )
     memory: float = bounded(
         0.5,

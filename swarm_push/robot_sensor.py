@@ -29,22 +29,28 @@ class RobotSensorSettings:
         doc="Greatest distance at which a robot sees the object, another robot or a wall (m)",
     )
     rays: int = bounded(
-        180, low=24, high=3600, doc="Number of rays of a scan all round (dimensionless)"
+        180, low=24, high=3600, doc="Number of rays of a scan of the full circle (dimensionless)"
     )
     distance_error: float = bounded(
         0.01,
         low=0.0,
         high=0.5,
-        doc="Error of a measured distance as a fraction of the distance (dimensionless)",
+        doc="Standard deviation of a measured distance as a fraction of the distance "
+        "(dimensionless)",
     )
     least_error: float = bounded(
-        1e-3, low=0.0, high=0.1, doc="Error of a measured distance close to the robot (m)"
+        1e-3,
+        low=0.0,
+        high=0.1,
+        doc="Part of the standard deviation of a measured distance that does not depend on the "
+        "distance (m)",
     )
     odometry_error: float = bounded(
         0.02,
         low=0.0,
         high=0.5,
-        doc="Error of a measured motion of the robot as a fraction of it (dimensionless)",
+        doc="Standard deviation of the measured motion of the robot as a fraction of the motion "
+        "(dimensionless)",
     )
 
 

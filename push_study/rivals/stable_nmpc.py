@@ -70,18 +70,27 @@ class StableNmpcSettings:
     """Tolerances, and the programme."""
 
     position_tolerance: float = bounded(
-        0.02, low=1e-3, high=1.0, doc="Distance from its goal at which the object is there (m)."
+        0.02,
+        low=1e-3,
+        high=1.0,
+        doc="Greatest position error at which the goal counts as reached (m).",
     )
     orientation_tolerance: float = bounded(
-        0.1, low=1e-3, high=3.2, doc="Angle from its goal at which the object is there (rad)."
+        0.1,
+        low=1e-3,
+        high=3.2,
+        doc="Greatest heading error at which the goal counts as reached (rad).",
     )
     friction_trust: float = bounded(
         0.85,
         low=0.1,
         high=1.0,
-        doc="Fraction of the believed contact friction that pushes may use (dimensionless).",
+        doc="Fraction of the believed contact friction that pushes may use. They never use more "
+        "than the lower end of its believed interval (dimensionless).",
     )
-    period: float = bounded(0.2, low=0.01, high=5.0, doc="Time between two solves (s).")
+    period: float = bounded(
+        0.2, low=0.01, high=5.0, doc="Time between two solves of the nonlinear programme (s)."
+    )
 
 
 @dataclass(frozen=True)
