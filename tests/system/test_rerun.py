@@ -263,3 +263,25 @@ def test_a_demo_in_lockstep_ends_with_a_report_and_can_be_repeated(tmp_path, cap
     assert main([*words, "--factor", "2", "--out", str(out)]) == 2
     assert "no pace" in capsys.readouterr().err
     assert (out / "bag").is_dir()  # nothing was removed
+
+
+def test_a_demo_succeeds_within_the_tolerances_of_its_method(tmp_path, capsys):
+    """Robots with own sensing bring the object to within 10 cm, with any heading."""
+    small = """
+environment: {size: [3.0, 2.4]}
+robots:
+  e:
+    {type: epuck_ring, count: 6, placement: {random: {seed: 2, area: [-1.3, -0.3, -1.0, 1.0]}}}
+objects: {square: {type: transport_square, start: [0.0, 0.0, 0.2]}}
+goal: [0.25, 0.0, 1.5]
+parameters: {bridge: {world: planar}}
+"""
+    (tmp_path / "small.yaml").write_text(small)
+    out = tmp_path / "out"
+    words = ["demo", "own-sensing", "--scenario", str(tmp_path / "small.yaml"), "--lockstep"]
+    assert main([*words, "--out", str(out)]) == 0
+    told = capsys.readouterr().out
+    error = float(told.split("final error: ")[1].split(" mm")[0])
+    assert 20.0 < error <= 100.0
+    assert main(["rerun", str(out / "bag")]) == 0
+    assert "equal to the bit" in capsys.readouterr().out
