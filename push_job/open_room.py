@@ -86,6 +86,8 @@ class OpenRoomMethod:
         self._next = -math.inf
         self._held = np.zeros((0, 2))
         self._nearest, self._closer = math.inf, math.nan
+        self._item = arena.item
+        self._names: tuple[str, ...] = ()
 
     @property
     def status(self) -> Status:
@@ -113,14 +115,14 @@ class OpenRoomMethod:
         robot, grid = self._arena.robot, self._arena.grid
         x0, x1, y0, y1 = grid.extent
         inner = 2.0 * grid.resolution  # the walls of the room
-        item = belief.object(self._arena.object)
+        self._item = belief.object(self._arena.object)
         self._reason = f"target {self._index + 1} of {len(self._targets)}"
         self._next, self._held = -math.inf, np.zeros((0, 2))
         self._nearest, self._closer = math.inf, math.nan
         self._law = self._make(
             OpenRoom(
                 (x1 - x0 - inner, y1 - y0 - inner),
-                item,
+                self._item,
                 robot.footprint_radius,
                 robot.max_speed,
                 self._targets[self._index][:2],
@@ -130,7 +132,9 @@ class OpenRoomMethod:
 
     def step(self, seen: Seen, belief: Belief) -> Told:
         """See Method."""
-        names = [n for n in self._arena.robots if n in seen.robots]
+        if not self._busy:
+            return Told()
+        names = tuple(n for n in self._arena.robots if n in seen.robots)
         away, _ = self.errors(seen)
         if away < self._settings.position_tolerance:
             self._index += 1
@@ -144,9 +148,10 @@ class OpenRoomMethod:
         if not names or self._law is None:
             return Told()
         robot, robots = self._arena.robot, np.array([seen.robots[n] for n in names])
-        if seen.time >= self._next - 1e-9 or len(self._held) != len(robots):
-            self._next = seen.time + _STEP
-            pose = belief.object(self._arena.object).mass_pose(seen.object)
+        waits = 1e-9 < self._next - seen.time < _STEP + 1e-9  # else time has jumped back
+        if not waits or names != self._names:
+            self._next, self._names = seen.time + _STEP, names
+            pose = self._item.mass_pose(seen.object)
             chosen = self._law.velocities(seen.time, pose, robots)
             fast = np.hypot(*chosen.T) / robot.max_speed
             self._held = chosen / np.maximum(fast, 1.0)[:, None]
