@@ -11,11 +11,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from push_job.method import Arena, Certificate, MethodSpec, Refusal, Seen, Task, Told
+from push_job.method import Arena, Certificate, MethodSpec, Refusal, Seen, Task, Told, Unsuited
 from push_job.report import Figure, Report, Status, discs
 from push_model.arrays import Array
 from push_model.belief import Belief
 from push_model.jobs import JobError, JobPhase
+from push_model.occupancy import OccupancyGrid
 from push_model.settings import bounded, settings
 from push_model.specs import ObjectSpec
 
@@ -50,9 +51,9 @@ class OpenRoomSettings:
 
 @dataclass(frozen=True)
 class OpenRoom:
-    """Where a law works.
+    """Where a law works, with the origin in the middle of the room.
 
-    size: [m] of a room about the origin. item: the object. radius [m], speed [m/s]: of the robots.
+    size: [m] of the room. item: the object. radius [m], speed [m/s]: of the robots.
     target ``(2,)`` [m]. seed: of what it draws.
     """
 
@@ -88,6 +89,8 @@ class OpenRoomMethod:
         self._nearest, self._closer = math.inf, math.nan
         self._item = arena.item
         self._names: tuple[str, ...] = ()
+        low, high = _free(arena.grid)
+        self._middle, self._size = 0.5 * (low + high), high - low
 
     @property
     def status(self) -> Status:
@@ -112,20 +115,17 @@ class OpenRoomMethod:
         self._aim(belief)
 
     def _aim(self, belief: Belief) -> None:
-        robot, grid = self._arena.robot, self._arena.grid
-        x0, x1, y0, y1 = grid.extent
-        inner = 2.0 * grid.resolution  # the walls of the room
-        self._item = belief.object(self._arena.object)
+        robot, self._item = self._arena.robot, belief.object(self._arena.object)
         self._reason = f"target {self._index + 1} of {len(self._targets)}"
         self._next, self._held = -math.inf, np.zeros((0, 2))
         self._nearest, self._closer = math.inf, math.nan
         self._law = self._make(
             OpenRoom(
-                (x1 - x0 - inner, y1 - y0 - inner),
+                (float(self._size[0]), float(self._size[1])),
                 self._item,
                 robot.footprint_radius,
                 robot.max_speed,
-                self._targets[self._index][:2],
+                self._targets[self._index][:2] - self._middle,
                 self._settings.seed,
             )
         )
@@ -151,8 +151,9 @@ class OpenRoomMethod:
         waits = 1e-9 < self._next - seen.time < _STEP + 1e-9  # else time has jumped back
         if not waits or names != self._names:
             self._next, self._names = seen.time + _STEP, names
-            pose = self._item.mass_pose(seen.object)
-            chosen = self._law.velocities(seen.time, pose, robots)
+            origin = np.array([*self._middle, 0.0])
+            pose = self._item.mass_pose(seen.object) - origin
+            chosen = self._law.velocities(seen.time, pose, robots - origin)
             fast = np.hypot(*chosen.T) / robot.max_speed
             self._held = chosen / np.maximum(fast, 1.0)[:, None]
         told = self._held
@@ -197,6 +198,16 @@ class OpenRoomMethod:
     def facts(self) -> Mapping[str, Any]:
         """See Method."""
         return {"target": f"{self._index + 1} of {len(self._targets)}"}
+
+
+def _free(grid: OccupancyGrid) -> tuple[Array, Array]:
+    """Lower left and upper right corner ``(2,)`` [m] of the room: of the free cells of a map."""
+    rows, columns = np.nonzero(~grid.occupied)
+    if not len(rows):
+        raise Unsuited("the map has no free cell")
+    first = np.array([columns.min(), rows.min()])
+    last = np.array([columns.max(), rows.max()]) + 1
+    return grid.origin + grid.resolution * first, grid.origin + grid.resolution * last
 
 
 def open_room_method(name: str, make: Callable[[OpenRoom], VelocityLaw]) -> MethodSpec:

@@ -1,6 +1,7 @@
 """The host of laws in an open room: what it tells a law, and when robots stand."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from push_job.open_room import OpenRoomMethod, OpenRoomSettings
 from push_model import se2
 from push_model.belief import Belief, Interval
 from push_model.jobs import JobError, JobPhase
-from push_model.occupancy import rasterise
+from push_model.occupancy import OccupancyGrid, rasterise
 from push_model.specs import EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
 
@@ -41,6 +42,27 @@ def hosted(grid=ROOM, count=2, item=SQUARE):
 
 def seen(time, at=(0.0, 0.0, 0.0), robots=("e0", "e1")):
     return Seen(time, np.array(at), {n: np.array([-1.0, int(n[1:]), 0.0]) for n in robots})
+
+
+def test_the_room_is_what_is_free_wherever_the_map_lies():
+    """The walls of a grid are two cells thick; other maps have other walls, and another origin."""
+    corner = np.array([7.0, -3.0])
+    thick = np.pad(ROOM.occupied, ((0, 3), (5, 0)), constant_values=True)
+    for grid, shift in (
+        (ROOM, np.zeros(2)),
+        (OccupancyGrid(thick, 0.05, ROOM.origin + corner - [0.25, 0.0]), corner),
+    ):
+        method, belief, laws = hosted(grid)
+        moved = np.array([*shift, 0.0])
+        method.begin(Task((FAR + moved,)), belief)
+        here = seen(1.0)
+        robots = {n: p + moved for n, p in here.robots.items()}
+        method.step(replace(here, object=here.object + moved, robots=robots), belief)
+        ((_, pose, places),) = laws[0].told
+        assert laws[0].room.size == pytest.approx((4.0, 3.0))
+        assert laws[0].room.target == pytest.approx(FAR[:2])
+        assert pose == pytest.approx(SQUARE.mass_pose(here.object))
+        assert places == pytest.approx(np.array(list(here.robots.values())))
 
 
 def test_robots_stand_once_the_task_has_ended():
