@@ -59,9 +59,8 @@ _STANDOFF, _TOUCH_SPEED, _TOUCH_BRAKING = 0.03, 0.06, 0.2  # [m], [m/s], [m/s^2]
 _FILTER = 0.2  # [s] time constant of where the object is on the bumper
 _GAP, _TURN, _LOST = 0.015, 0.25, 0.5  # [m], [rad] of a contact in doubt; [s] until it is lost
 _PATIENCE = 10  # solves in a row that do not reach the goal, or fail
-_STILL = 0.3  # [s] after the last command, until the error counts
-_NEAR_TIME = 0.06  # [s] of a plan that is over
-_TICK = 0.01  # [s] assumed between the first frames
+_STILL, _NEAR_TIME = 0.3, 0.06  # [s] from the last command to the verdict; of a plan that is over
+_TICK, _BREAK = 0.01, 0.25  # [s] assumed between first frames; after which a robot has stopped
 _CLEARANCES = (0.1, 0.07, 0.05)  # [m] of the object's way on the map, the first that leads there
 
 
@@ -160,10 +159,10 @@ class StableNmpcMethod:
         """See Method."""
         self._goal, self._code, self._reason = task.goal, JobError.NONE, "looking for a push"
         self._phase, self._time, self._doubt = JobPhase.PLANNING, math.nan, 0.0
+        self._item, self._shown = belief.object(self._arena.object), math.nan
         self._in_force, self.solves = (0.0, 0.0), []
-        delay = self._tracker.settings.pose_delay
-        if (POSES, "latency") in belief.values:
-            delay = belief.latency.value
+        known = (POSES, "latency") in belief.values
+        delay = belief.latency.value if known else self._tracker.settings.pose_delay
         self._tracker.believe(None, delay)
         self._reckoning = DeadReckoning(delay)
         self._search: Iterator[tuple[Grip, Plan, Array]] | None = None
@@ -171,30 +170,35 @@ class StableNmpcMethod:
     def step(self, seen: Seen, belief: Belief) -> Told:
         """See Method."""
         robot = seen.robots.get(self._name)
-        if robot is None or self._goal is None:
+        if self._goal is None or self._phase is JobPhase.IDLE:
             return Told()
-        if seen.ages.get(self._name, 0.0) > self._tracker.settings.give_up:
+        dt, age = seen.time - self._time, seen.ages.get(self._name, 0.0)
+        if robot is not None or math.isnan(self._shown):
+            self._shown = seen.time - age  # when the robot was measured last
+        if stale := seen.time - self._shown > self._tracker.settings.give_up:
             self.end(JobError.POSES_STALE, f"no poses of '{self._name}' arrive")
-        if self._phase is JobPhase.IDLE:
+        if stale or robot is None:
             return Told()
-        dt = seen.time - self._time if seen.time > self._time else _TICK
-        self._time, planning, item = seen.time, 0.0, self._item.mass_pose(seen.object)
+        if not 0.0 < dt <= _BREAK:
+            dt, self._in_force = _TICK, (0.0, 0.0)
+            self._reckoning.clear()
+            self._tracker.halt()
+        self._time, item = seen.time, self._item.mass_pose(seen.object)
         if self._phase is JobPhase.PLANNING:
             began = time.thread_time()
             self._look(robot, seen.object, belief)
-            planning = time.thread_time() - began
-            command = 0.0, 0.0
-        elif self._phase is JobPhase.PUSHING:
-            command = self._push(dt, robot, item, seen.ages.get(self._name, 0.0))
+            return Told({self._name: (0.0, 0.0)}, time.thread_time() - began)
+        if self._phase is JobPhase.PUSHING:
+            shown = seen.ages.get(self._arena.object, 0.0) <= 0.0
+            command = self._push(dt, robot, item if shown else None, age)
         else:
-            command = self._drive(dt, robot, item)
-        return Told({self._name: command}, planning)
+            command = self._drive(dt, robot, item, age)
+        return Told({self._name: command})
 
     def _look(self, robot: Array, seen: Array, belief: Belief) -> None:
         """One solve: the first side from which a plan reaches the goal, and the way to it."""
         assert self._goal is not None
-        spec, self._item = belief.robot(self._name), belief.object(self._arena.object)
-        item = self._item.mass_pose(seen)
+        spec, item = belief.robot(self._name), self._item.mass_pose(seen)
         if self._search is None:
             if not np.array_equal(self._item.geometry.outline, self._nmpc.outline):
                 self._nmpc = StableProgramme(self._arena.grid, spec, self._item)
@@ -258,9 +262,9 @@ class StableNmpcMethod:
             Track(way, None, circles, s.position_tolerance, s.orientation_tolerance)
         )
 
-    def _drive(self, dt: float, robot: Array, item: Array) -> tuple[float, float]:
+    def _drive(self, dt: float, robot: Array, item: Array, age: float) -> tuple[float, float]:
         """To the side, and straight on until contact."""
-        tick = self._tracker.tick(dt, robot, None)
+        tick = self._tracker.tick(dt, robot, None, age=age)
         if tick.finished and tick.code:
             self.end(JobError.POSITIONING_FAILED, tick.message)
         elif tick.finished and self._phase is JobPhase.POSITIONING:
@@ -279,10 +283,11 @@ class StableNmpcMethod:
         self._reckoning.clear()
         return self._in_force
 
-    def _push(self, dt: float, robot: Array, item: Array, age: float) -> tuple[float, float]:
+    def _push(self, dt: float, robot: Array, item: Array | None, age: float) -> tuple[float, float]:
         assert self._plan is not None
         self._reckoning.record(dt, *self._in_force)
         there = self._reckoning.at_frame(robot, age)
+        item = se2.compose(there, self._measured) if item is None else item  # it is not shown
         seen = se2.between(there, item)
         off = seen - self._measured
         off[2] = se2.wrap(float(off[2]))

@@ -26,6 +26,7 @@ from push_study.rivals.stable_nmpc import (
 from push_study.rivals.stable_programme import ACCELERATION, MARGIN, StableProgramme, cubic
 from push_study.team_run import OBJECT, made_scenario, run_team
 from push_study.uncertainty import uncertainty
+from sim_bridge.planar_world import PlanarWorld
 
 ROBOT, BOX = load_robot("epuck"), load_object("box9")
 ROOM = EnvironmentSpec((1.6, 1.2))
@@ -175,6 +176,86 @@ def test_a_short_match_in_lockstep_reaches_a_goal_ahead():
     ahead = off[-1] - [ROBOT.push_distance + 0.045, 0.0, 0.0]
     assert np.abs(ahead) == pytest.approx(0.0, abs=5e-3), "the object has not slipped"
     assert outcome.trace.figures["CPU time of a solve"]
+
+
+class Pushed:
+    """A task in the planar world, frame by frame; the robot begins behind the object."""
+
+    def __init__(self, arena, goal):
+        self.method, self.time, self.belief = StableNmpcMethod(arena), 0.0, BELIEF
+        self.method.begin(Task((np.array(goal),)), BELIEF)
+        starts = {"e0": (ROBOT, np.array([-0.6, 0.0, 0.0]))}
+        self.world = PlanarWorld(ROOM, starts, {OBJECT: (BOX, HERE.object)})
+
+    def frame(self, robot=True, ages=()):
+        """v, omega of the answer; nothing is told where the frame shows no robot."""
+        poses = self.world.poses()
+        robots = {"e0": poses["e0"]} if robot else {}
+        seen = Seen(self.time, poses[OBJECT], robots, ages=dict(ages))
+        told = self.method.step(seen, self.belief).commands
+        command = told.get("e0", (0.0, 0.0))
+        self.world.command("e0", *command)
+        self.world.step(round(0.01 / self.world.time_step))
+        self.time += 0.01
+        return command
+
+    def until(self, holds):
+        for _ in range(6000):
+            command = self.frame()
+            if holds(command):
+                return
+        raise AssertionError(self.method.status)
+
+    def fast(self, command):
+        return self.method.status.phase == JobPhase.PUSHING and command[0] > 0.1
+
+
+@pytest.mark.parametrize("pushing", [False, True])
+def test_a_robot_that_is_not_seen_any_more_ends_the_task(arena, pushing):
+    run = Pushed(arena, [0.2, 0.05, 0.1])
+    if pushing:
+        run.until(run.fast)
+    phase = run.method.status.phase
+    for _ in range(490):
+        assert run.frame(robot=False) == (0.0, 0.0)
+    assert run.method.status.phase == phase
+    for _ in range(20):
+        run.frame(robot=False)
+    assert run.method.status.code == JobError.POSES_STALE
+    assert run.frame() == (0.0, 0.0) and run.method.release() == {"e0"}
+
+
+def test_a_robot_that_stood_unseen_speeds_up_again_and_reaches_the_goal(arena):
+    run = Pushed(arena, [0.2, 0.05, 0.1])
+    run.until(run.fast)
+    for _ in range(200):
+        assert run.frame(robot=False) == (0.0, 0.0)
+    speeds = [run.frame()[0] for _ in range(20)]
+    assert np.diff([0.0, *speeds]).max() <= 0.01 * ACCELERATION + 1e-9
+    run.until(lambda _: run.method.status.phase == JobPhase.IDLE)
+    assert run.method.status.code == JobError.NONE, run.method.status.reason
+
+
+def test_a_pose_of_the_object_from_an_earlier_frame_does_not_move_it_on_the_bumper(arena):
+    run = Pushed(arena, [0.2, 0.05, 0.1])
+    run.until(run.fast)
+    before = run.method._measured.copy()
+    run.world.poses = lambda poses=run.world.poses: {**poses(), OBJECT: HERE.object}
+    run.frame(ages={OBJECT: 0.1})
+    assert run.method._measured == pytest.approx(before, abs=1e-12)
+    run.frame()
+    assert run.method._measured[0] < before[0] - 5e-4
+
+
+def test_a_belief_that_changes_before_the_push_does_not_move_the_object(arena, monkeypatch):
+    """Its centre of mass is where it was when the task began, as in the plan."""
+    run = Pushed(arena, [0.2, 0.05, 0.1])
+    with monkeypatch.context() as patch:
+        patch.setattr(run.method, "_misses", lambda plan, goal: "it looks for another one")
+        run.frame()
+    run.belief = BELIEF.updated({(OBJECT, "com_x"): Interval.exact(0.03)})
+    run.until(lambda _: run.method.status.phase == JobPhase.IDLE)
+    assert run.method.status.code == JobError.NONE, run.method.status.reason
 
 
 def test_casadi_is_not_loaded_before_it_is_needed():
