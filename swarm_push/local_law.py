@@ -141,7 +141,7 @@ class LocalLaw:
     def step(self, reading: Reading, dt: float) -> Array:
         """Velocity ``(2,)`` [m/s] in the robot's frame. dt: [s] since the reading before."""
         if len(reading.object) < _SEEN:
-            self._centre = None
+            self._centre, self._drifts = None, np.zeros(2)
             return self._search(reading)
         centre = self._look(reading, dt)
         to_target = reading.target - centre

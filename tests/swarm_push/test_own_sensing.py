@@ -213,3 +213,17 @@ def test_a_robot_that_sees_nothing_goes_to_those_that_it_sees_else_to_the_target
     told = OwnSensing(room, LocalLawSettings(), near).velocities(0.0, np.zeros(3), robots)
     assert told[0] == pytest.approx([SPEED, 0.0], abs=1e-6)
     assert told[2] == pytest.approx(SPEED * np.array([1.0, 1.0]) / math.sqrt(2.0), abs=1e-6)
+
+
+def test_what_is_remembered_of_the_object_is_forgotten_where_it_is_lost():
+    """The frame of the robot turns meanwhile: afterwards it pushes as one that has seen nothing."""
+    robots = np.array([[-0.27, 0.05, 0.3]])
+    seen = lambda pose: sensor().look(np.array(pose), robots, np.array([3.0, 3.0]))[0]  # noqa: E731
+    one, other = (LocalLaw(RADIUS, SPEED, LocalLawSettings()) for _ in range(2))
+    for tick in range(20):
+        one.step(seen([0.0, -1e-3 * tick, 0.0]), 0.02)
+    again = seen([0.0, 0.0, 0.0])
+    drifted = LocalLaw.step(one, again, 0.0)
+    one.step(seen([20.0, 0.0, 0.0]), 0.02)
+    assert np.array_equal(one.step(again, 0.02), other.step(again, 0.0))
+    assert not np.allclose(drifted, other.step(again, 0.0))
