@@ -149,7 +149,8 @@ class LocalLaw:
         u = to_target / max(left, 1e-9)
         away = np.hypot(*reading.object.T)
         nearest = int(away.argmin())
-        gap, inward = float(away[nearest]) - self._radius, reading.object[nearest] / away[nearest]
+        gap = float(away[nearest]) - self._radius
+        inward = reading.object[nearest] / max(float(away[nearest]), 1e-9)
         s, top = self.settings, self._speed
         pace = max(s.least_speed * top, min(s.speed * top, s.slowing * left))
         mates, at, behind = self._mates(reading, u)

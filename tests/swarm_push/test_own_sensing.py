@@ -227,3 +227,17 @@ def test_what_is_remembered_of_the_object_is_forgotten_where_it_is_lost():
     one.step(seen([20.0, 0.0, 0.0]), 0.02)
     assert np.array_equal(one.step(again, 0.02), other.step(again, 0.0))
     assert not np.allclose(drifted, other.step(again, 0.0))
+
+
+def test_poses_that_cannot_be_give_commands_that_are_finite():
+    """Robots on the outline, in the object and in each other; time that stands still or goes back;
+    robots that come and go; an object that is at its target, or not seen."""
+    room = OpenRoom((9.0, 9.0), SQUARE, RADIUS, SPEED, np.array([1.0, 0.0]), 1)
+    law = OwnSensing(room, LocalLawSettings(), EXACT)
+    for time, x, robots in (
+        *((1.0, 0.0, [[-0.2, 0.0, 0.0], [-0.2, 0.2, 2.0]]), (1.0, 0.0, [[0.1, 0.0, 1.0]] * 2)),
+        *((0.5, 0.0, [[-0.3, 0.0, 0.0]]), (0.6, 1.0, [[0.72, 0.0, 0.0], [0.8, 0.0, 0.0]])),
+        (0.7, math.nan, [[0.72, 0.0, 0.0], [0.8, 0.0, 0.0]]),
+    ):
+        told = law.velocities(time, np.array([x, 0.0, 0.0]), np.array(robots))
+        assert told.shape == (len(robots), 2) and np.isfinite(told).all(), (time, x, robots)
