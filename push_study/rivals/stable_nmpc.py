@@ -24,7 +24,6 @@ Only the abstract could be read. Filled in:
 import math
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -37,14 +36,9 @@ from push_model.arrays import Array
 from push_model.belief import POSES, Belief
 from push_model.distance_field import DistanceField
 from push_model.jobs import GoalRefused, JobError, JobPhase
-from push_model.pushable_sides import pushable_sides
-from push_model.settings import SettingsError, bounded, settings
-from push_model.shapes import Side
+from push_model.settings import SettingsError
 from push_model.specs import ObjectSpec, RobotSpec
 from push_model.stable_push import (
-    CurvatureLimits,
-    contact_on_side,
-    curvature_limits,
     shifted_limits,
 )
 from push_model.trajectory import Trajectory, line
@@ -52,6 +46,7 @@ from push_mpc import LtvMpc, MpcSettings, TrackerSettings, TrajectoryTracker
 from push_mpc import Task as Track
 from push_planner import NoRobotPath, PlannerSettings, plan_robot_path
 from push_planner.guide_path import lattice_path
+from push_study.rivals.stable_grips import Grip, StableNmpcSettings, grips
 from push_study.rivals.stable_programme import ACCELERATION, MARGIN, Plan, StableProgramme, cubic
 from push_supervisor import SupervisorSettings, Surroundings
 
@@ -62,58 +57,6 @@ _PATIENCE = 10  # solves in a row that do not reach the goal, or fail
 _STILL, _NEAR_TIME = 0.3, 0.06  # [s] from the last command to the verdict; of a plan that is over
 _TICK, _BREAK = 0.01, 0.25  # [s] assumed between first frames; after which a robot has stopped
 _CLEARANCES = (0.1, 0.07, 0.05)  # [m] of the object's way on the map, the first that leads there
-
-
-@settings
-class StableNmpcSettings:
-    """Tolerances, and the programme."""
-
-    position_tolerance: float = bounded(
-        0.02,
-        low=1e-3,
-        high=1.0,
-        doc="Greatest position error at which the goal counts as reached (m).",
-    )
-    orientation_tolerance: float = bounded(
-        0.1,
-        low=1e-3,
-        high=3.2,
-        doc="Greatest heading error at which the goal counts as reached (rad).",
-    )
-    friction_trust: float = bounded(
-        0.85,
-        low=0.1,
-        high=1.0,
-        doc="Fraction of the believed contact friction that pushes may use. They never use more "
-        "than the lower end of its believed interval (dimensionless).",
-    )
-    period: float = bounded(
-        0.2, low=0.01, high=5.0, doc="Time between two solves of the nonlinear programme (s)."
-    )
-
-
-@dataclass(frozen=True)
-class Grip:
-    """A side with the bumper on it: pose ``(3,)`` of the object's centre of mass in the robot's
-    frame; stable curvatures of the robot's path."""
-
-    side: Side
-    grasp: Array
-    limits: CurvatureLimits
-
-
-def grips(own: StableNmpcSettings, belief: Belief, robot: RobotSpec, name: str) -> tuple[Grip, ...]:
-    """Of all sides of an object that can be pushed without slipping, as far as is believed."""
-    item, found = belief.object(name), []
-    friction = belief.interval(name, "contact_friction")
-    mu = min(own.friction_trust * friction.value, friction.low)
-    for side in pushable_sides(item.geometry, robot):
-        contact = contact_on_side(side, robot.flat_bumper.width)
-        limits = curvature_limits(contact, robot.push_distance, mu, item.limit_surface())
-        if limits is not None:
-            ahead = robot.push_distance + float(contact.centre[0])
-            found.append(Grip(side, np.array([ahead, contact.centre[1], contact.heading]), limits))
-    return tuple(found)
 
 
 class StableNmpcMethod:
