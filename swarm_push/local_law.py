@@ -11,6 +11,7 @@ target slows down, until robots at another side make up for it. Near the target 
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numba
@@ -29,6 +30,8 @@ _DEEP = 0.75  # of half the extent: between a square, which is as deep as wide, 
 _REACH, _SWEEPS = 0.15, 4  # [m] of gaps that are looked at; sweeps over them
 _PRESS, _FASTEST = 0.01, 0.06  # [m/s] into the object in contact, and at most
 _KEEPS = 20.0  # [1/m] of gaps to the object as a part of the speed, on the way round it
+_PATIENCE, _STRAIGHT = 10.0, 20.0  # [s] before a robot walks at random; of a straight walk, mean
+_TURNS = 0.2  # [m] from a wall: a robot that walks at random turns
 _SLOWEST = 0.2  # part of its speed that a robot keeps that makes the object drift
 
 
@@ -132,9 +135,14 @@ class LocalLawSettings:
 class LocalLaw:
     """One robot of a radius [m] and a greatest speed [m/s], and what it remembers."""
 
-    def __init__(self, radius: float, speed: float, settings: LocalLawSettings) -> None:
+    def __init__(
+        self, radius: float, speed: float, settings: LocalLawSettings, seed: Sequence[int] = (0,)
+    ) -> None:
+        """seed: of the directions in which it looks for the object."""
+        self._random = np.random.default_rng(seed)
+        self._lost, self._heading = 0.0, self._random.uniform(-math.pi, math.pi)  # [s], [rad]
         self._radius, self._speed, self._settings = radius, speed, settings
-        self._half = _LEAST_HALF  # [m] of the object's widest extent that was seen
+        self._half = _LEAST_HALF  # [m] of the extent of the object that is seen
         self._centre: Array | None = None  # (2,) [m] of the object at the last reading
         self._drifts = np.zeros(2)  # [m/s] of the object
 
@@ -142,7 +150,8 @@ class LocalLaw:
         """Velocity ``(2,)`` [m/s] in the robot's frame. dt: [s] since the reading before."""
         if len(reading.object) < _SEEN:
             self._centre, self._drifts = None, np.zeros(2)
-            return self._search(reading)
+            return self._search(reading, dt)
+        self._lost = 0.0
         centre = self._look(reading, dt)
         to_target = reading.target - centre
         left = math.hypot(*to_target)
@@ -152,7 +161,7 @@ class LocalLaw:
         gap = float(away[nearest]) - self._radius
         inward = reading.object[nearest] / max(float(away[nearest]), 1e-9)
         s, top = self.settings, self._speed
-        pace = max(s.least_speed * top, min(s.speed * top, s.slowing * left))
+        pace = min(s.speed * top, max(s.least_speed * top, s.slowing * left))
         mates, at, behind = self._mates(reading, u)
         moving = np.where(behind[:, None], pace * u, 0.0)
         if inward @ u > s.least:
@@ -226,13 +235,24 @@ class LocalLaw:
         v: Array = self._speed * (along + closer * inward)
         return v
 
-    def _search(self, reading: Reading) -> Array:
+    def _search(self, reading: Reading, dt: float) -> Array:
         """Velocity ``(2,)`` [m/s] of a robot that does not see the object: to the robots that it
-        sees, for some of them may; else to the target."""
-        seen = len(reading.robots) > 0
-        way = reading.robots.mean(axis=0) if seen else reading.target
+        sees, for some of them may; else to the target. If this has not helped for a time, it walks
+        straight on, in a new direction at each wall and now and then."""
+        self._lost += dt
+        walls = reading.walls
+        if self._lost > _PATIENCE:
+            self._heading -= float(reading.moved[2])
+            way = np.array([math.cos(self._heading), math.sin(self._heading)])
+            meets = walls[np.hypot(*walls.T) < _TURNS] @ way > 0.0
+            if meets.any() or self._random.random() < dt / _STRAIGHT:
+                self._heading = self._random.uniform(-math.pi, math.pi)
+        elif len(reading.robots):
+            way = reading.robots.mean(axis=0)
+        else:
+            way = reading.target
         v = self._speed * way / max(math.hypot(*way), 1e-9)
-        return self._apart(v, reading.robots, np.zeros_like(reading.robots), reading.walls)
+        return self._apart(v, reading.robots, np.zeros_like(reading.robots), walls)
 
     def _apart(self, v: Array, mates: Array, moving: Array, walls: Array) -> Array:
         """The constraint of ``spacing.py``, in which a robot does its own part: it does not know

@@ -30,10 +30,14 @@ class OwnSensing:
         """See VelocityLaw."""
         if len(self._robots) != len(robots):
             room = self._room
-            self._robots = [LocalLaw(room.radius, room.speed, self._law) for _ in robots]
+            self._robots = [
+                LocalLaw(room.radius, room.speed, self._law, (room.seed, 9, i))
+                for i in range(len(robots))
+            ]
         dt, self._last = 0.0 if self._last is None else time - self._last, time
         readings = self._sensor.look(pose, robots, self._room.target)
-        own = np.array([r.step(v, dt) for r, v in zip(self._robots, readings, strict=True)])
+        told = [r.step(v, dt) for r, v in zip(self._robots, readings, strict=True)]
+        own = np.array(told).reshape(-1, 2)
         c, s = np.cos(robots[:, 2]), np.sin(robots[:, 2])
         return np.column_stack([c * own[:, 0] - s * own[:, 1], s * own[:, 0] + c * own[:, 1]])
 

@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from push_estimation.dead_reckoning import DeadReckoning
-from push_job.method import Arena, Certificate, MethodSpec, Refusal, Seen, Task, Told
+from push_job.method import Arena, Certificate, MethodSpec, Refusal, Seen, Task, Told, Unsuited
 from push_job.report import Figure, Report, Status, polyline
 from push_model import se2
 from push_model.arrays import Array
@@ -56,6 +56,10 @@ _GAP, _TURN, _LOST = 0.015, 0.25, 0.5  # [m], [rad] of a contact in doubt; [s] u
 _PATIENCE = 10  # solves in a row that do not reach the goal, or fail
 _STILL, _NEAR_TIME = 0.3, 0.06  # [s] from the last command to the verdict; of a plan that is over
 _TICK, _BREAK = 0.01, 0.25  # [s] assumed between first frames; after which a robot has stopped
+_OF_PUSHES = (
+    *("tracked", "friction_trust", "stop_before_slip", "slip_warning", "grasp_filter"),
+    *("contact_gap", "contact_aside", "contact_turn", "contact_time"),
+)  # settings of the tracker
 _CLEARANCES = (0.1, 0.07, 0.05)  # [m] of the object's way on the map, the first that leads there
 
 
@@ -68,7 +72,11 @@ class StableNmpcMethod:
         self._field = DistanceField(arena.grid)
         self._planning = PlannerSettings()
         mpc = LtvMpc(arena.section("mpc", MpcSettings), arena.robot.differential)
-        self._tracker = TrajectoryTracker(arena.section("tracker", TrackerSettings), mpc)
+        tracker = arena.section("tracker", TrackerSettings)
+        for name in _OF_PUSHES:
+            if getattr(tracker, name) != getattr(TrackerSettings(), name):
+                raise Unsuited(f"tracker.{name} has no effect: its pushes are not tracked")
+        self._tracker = TrajectoryTracker(tracker, mpc)
         self._tracker.warm_up()
         self._nmpc = StableProgramme(arena.grid, arena.robot, arena.item)
         self._item = arena.item
@@ -221,6 +229,7 @@ class StableNmpcMethod:
             self._tracker.stop()
             self._phase, self._reason = JobPhase.PUSHING, "pushing"
             self._measured, self._since = self._grip.grasp.copy(), self._own.period
+            self._waited = self._own.period
             self._failed, self._over, self._doubt = 0, 0.0, 0.0
         self._in_force = (tick.v, tick.omega)
         self._reckoning.clear()
@@ -237,7 +246,7 @@ class StableNmpcMethod:
         self._measured += min(1.0, dt / _FILTER) * off
         now = self._reckoning.now(there)
         self._reckoning.forget(age)
-        self._since += dt
+        self._since, self._waited = self._since + dt, self._waited + dt
         lost = seen - self._grip.grasp
         half = 0.5 * self._arena.robot.flat_bumper.width
         far = lost[0] > _GAP or abs(lost[1]) > half or abs(se2.wrap(float(lost[2]))) > _TURN
@@ -246,7 +255,7 @@ class StableNmpcMethod:
             text = f"{1e3 * lost[0]:.0f} mm ahead, {1e3 * abs(lost[1]):.0f} mm aside"
             self.end(JobError.EXECUTION_FAILED, f"contact was lost: the object is {text}")
             return 0.0, 0.0
-        if self._over == 0.0 and self._since >= self._own.period - 1e-9:
+        if self._over == 0.0 and self._waited >= self._own.period - 1e-9:
             self._solve(now)
             if self._plan is None:
                 return 0.0, 0.0
@@ -267,7 +276,7 @@ class StableNmpcMethod:
     def _solve(self, robot: Array) -> None:
         """The next plan, from where the object is on the bumper."""
         assert self._goal is not None and self._plan is not None
-        began = time.thread_time()
+        began, self._waited = time.thread_time(), 0.0
         before = self._plan
         goal = se2.compose(self._item.mass_pose(self._goal), se2.inverse(self._measured))
         robot, goal = _beside(robot, before.poses[0, 2]), _beside(goal, before.poses[-1, 2])

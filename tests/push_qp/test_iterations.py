@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from benchmarks.iterations import Traced, deviation, summary
+from benchmarks.measure import supported
 from benchmarks.mpc import TICKS, kinds
 from benchmarks.mpc import cases as ticks
 from benchmarks.solvers import Clocked, _measured, _row
@@ -268,5 +269,7 @@ def test_a_solver_is_compared_on_the_steps_that_it_took():
     slow = _row(taken["osqp"], ours)
     assert slow["steps"] < 6 * TICKS, "as much CPU time as ours, so fewer steps"
     assert slow["ours_p50"] > 1.0 and "step_p99_s" not in slow, "100 steps have no p99"
+    assert supported(999) == [50.0] and supported(1000) == [50.0, 99.0]
+    assert supported(10_000)[-1] == 99.9 and supported(100_000)[-1] == 99.99
     assert slow["rounds"]["max"] >= 1
     assert isinstance(ours.solver, Clocked) and len(ours.solver.spent) == 6 * TICKS

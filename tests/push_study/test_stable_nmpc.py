@@ -2,11 +2,12 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from push_job.method import Arena, Refusal, Seen, Task
+from push_job.method import Arena, Refusal, Seen, Task, Unsuited
 from push_model import se2
 from push_model.belief import Belief, Interval
 from push_model.distance_field import DistanceField
@@ -15,6 +16,7 @@ from push_model.occupancy import rasterise
 from push_model.settings import SettingsError
 from push_model.specs import BoxSpec, EnvironmentSpec
 from push_model.stable_push import PusherContact, contact_margins
+from push_mpc import TrackerSettings
 from push_scenario.bodies import load_object, load_robot
 from push_study.rivals.stable_nmpc import (
     METHOD,
@@ -176,6 +178,13 @@ def test_a_short_match_in_lockstep_reaches_a_goal_ahead():
     ahead = off[-1] - [ROBOT.push_distance + 0.045, 0.0, 0.0]
     assert np.abs(ahead) == pytest.approx(0.0, abs=5e-3), "the object has not slipped"
     assert outcome.trace.figures["CPU time of a solve"]
+
+
+@pytest.mark.parametrize("name", ["friction_trust", "slip_warning", "contact_gap"])
+def test_a_setting_of_the_tracker_that_does_nothing_is_refused(arena, name):
+    tracker = replace(TrackerSettings(), **{name: 0.5})
+    with pytest.raises(Unsuited, match=f"tracker.{name} has no effect"):
+        StableNmpcMethod(replace(arena, settings={**arena.settings, "tracker": tracker}))
 
 
 class Pushed:

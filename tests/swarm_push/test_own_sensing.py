@@ -241,3 +241,22 @@ def test_poses_that_cannot_be_give_commands_that_are_finite():
     ):
         told = law.velocities(time, np.array([x, 0.0, 0.0]), np.array(robots))
         assert told.shape == (len(robots), 2) and np.isfinite(told).all(), (time, x, robots)
+
+
+def test_robots_far_away_that_see_only_each_other_find_the_object():
+    """They went to each other and stood there for ever."""
+    grid = EnvironmentSpec((5.0, 5.0), resolution=0.05)
+    method, belief = made(room=grid, count=6, seed=4)
+    places = [(2.0 + 0.15 * (k % 2), 2.0 + 0.15 * (k // 2), float(k)) for k in range(6)]
+    robots = {f"e{i}": (ROBOT, np.array(p)) for i, p in enumerate(places)}
+    method.begin(Task((np.array([-0.5, -1.5, math.nan]),)), belief)
+    start, tick = np.array([-1.5, -1.5, 0.0]), 0
+    with PlanarWorld(grid, robots, {"object": (SQUARE, start)}) as world:
+        while method.status.phase != JobPhase.IDLE and tick < 50 * 240:
+            poses = world.poses()
+            seen = Seen(tick / 50, poses["object"], {n: poses[n] for n in robots})
+            for name, told in method.step(seen, belief).commands.items():
+                world.command(name, *told)
+            world.step(round(0.02 / world.time_step))
+            tick += 1
+    assert method.status.code == 0, (method.status, poses)
