@@ -307,8 +307,7 @@ class StableNmpcMethod:
             return None
         away, turned = self.errors(seen)
         figures = [Figure("to the goal", away, "m"), Figure("heading error", turned, "rad")]
-        if self.solves:
-            figures.append(Figure("CPU time of a solve", self.solves[-1], "s"))
+        figures.append(Figure("solves", float(len(self.solves))))
         plan = self._plan
         shapes = () if plan is None else (polyline("plan", plan.poses[:, :2]),)
         return Report(self._phase.name.lower(), tuple(figures), shapes)
@@ -336,7 +335,8 @@ class StableNmpcMethod:
 
     def facts(self) -> Mapping[str, Any]:
         """See Method."""
-        return {"solves": len(self.solves)}
+        last = self.solves[-1] if self.solves else math.nan
+        return {"solves": len(self.solves), "CPU time of the last solve": f"{1e3 * last:.0f} ms"}
 
 
 def _beside(pose: Array, heading: float) -> Array:

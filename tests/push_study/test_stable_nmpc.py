@@ -177,7 +177,7 @@ def test_a_short_match_in_lockstep_reaches_a_goal_ahead():
     off = np.array([se2.between(robot, item) for item, robot in ways])
     ahead = off[-1] - [ROBOT.push_distance + 0.045, 0.0, 0.0]
     assert np.abs(ahead) == pytest.approx(0.0, abs=5e-3), "the object has not slipped"
-    assert outcome.trace.figures["CPU time of a solve"]
+    assert max(outcome.trace.figures["solves"]) > 5
 
 
 @pytest.mark.parametrize("name", ["friction_trust", "slip_warning", "contact_gap"])

@@ -49,7 +49,7 @@ SWARM = {
 
 
 def scenario_of(system):
-    if system == "single":
+    if system in ("single", "stable-nmpc"):
         return load_scenario("short")
     return scenario_from_mapping(GROUP if system == "group" else SWARM, system, "test")
 
@@ -61,7 +61,12 @@ def no_context_is_left():
 
 
 @pytest.mark.parametrize(
-    "system", [*(pytest.param(s, marks=pytest.mark.long) for s in ("single", "group")), "swarm"]
+    "system",
+    [
+        *(pytest.param(s, marks=pytest.mark.long) for s in ("single", "group")),
+        "swarm",
+        "stable-nmpc",
+    ],
 )
 def test_a_run_of_each_system_is_repeated_to_the_bit(system, tmp_path):
     """With the noise, the latency and the other frictions of a trial, which are in the bag."""
