@@ -16,7 +16,6 @@ from push_job.report import Figure, Report, Status, discs
 from push_model.arrays import Array
 from push_model.belief import Belief
 from push_model.jobs import JobError, JobPhase
-from push_model.occupancy import OccupancyGrid
 from push_model.settings import bounded, settings
 from push_model.specs import ObjectSpec
 
@@ -89,8 +88,12 @@ class OpenRoomMethod:
         self._nearest, self._closer = math.inf, math.nan
         self._item = arena.item
         self._names: tuple[str, ...] = ()
-        low, high = _free(arena.grid)
-        self._middle, self._size = 0.5 * (low + high), high - low
+        extent = arena.grid.free_extent
+        if extent is None:
+            raise Unsuited("the map has no free cell")
+        x0, x1, y0, y1 = extent
+        self._middle = 0.5 * np.array([x0 + x1, y0 + y1])
+        self._size = x1 - x0, y1 - y0
 
     @property
     def status(self) -> Status:
@@ -121,7 +124,7 @@ class OpenRoomMethod:
         self._nearest, self._closer = math.inf, math.nan
         self._law = self._make(
             OpenRoom(
-                (float(self._size[0]), float(self._size[1])),
+                self._size,
                 self._item,
                 robot.footprint_radius,
                 robot.max_speed,
@@ -198,16 +201,6 @@ class OpenRoomMethod:
     def facts(self) -> Mapping[str, Any]:
         """See Method."""
         return {"target": f"{self._index + 1} of {len(self._targets)}"}
-
-
-def _free(grid: OccupancyGrid) -> tuple[Array, Array]:
-    """Lower left and upper right corner ``(2,)`` [m] of the room: of the free cells of a map."""
-    rows, columns = np.nonzero(~grid.occupied)
-    if not len(rows):
-        raise Unsuited("the map has no free cell")
-    first = np.array([columns.min(), rows.min()])
-    last = np.array([columns.max(), rows.max()]) + 1
-    return grid.origin + grid.resolution * first, grid.origin + grid.resolution * last
 
 
 def open_room_method(name: str, make: Callable[[OpenRoom], VelocityLaw]) -> MethodSpec:

@@ -33,6 +33,17 @@ class OccupancyGrid:
         x, y = self.origin
         return x, x + columns * self.resolution, y, y + rows * self.resolution
 
+    @property
+    def free_extent(self) -> tuple[float, float, float, float] | None:
+        """x_min, x_max, y_min, y_max [m] of the rectangle about the free cells; None without."""
+        free = ~self.occupied
+        rows, columns = np.flatnonzero(free.any(axis=1)), np.flatnonzero(free.any(axis=0))
+        if not len(rows):
+            return None
+        (x, y), r = self.origin, self.resolution
+        left, right = x + columns[0] * r, x + (columns[-1] + 1) * r
+        return left, right, y + rows[0] * r, y + (rows[-1] + 1) * r
+
     def contains(self, x: float, y: float) -> bool:
         """Whether the point [m] lies on the grid."""
         x0, x1, y0, y1 = self.extent

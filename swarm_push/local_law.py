@@ -141,7 +141,7 @@ class LocalLaw:
         """seed: of the directions in which it looks for the object."""
         self._random = np.random.default_rng(seed)
         self._lost, self._heading = 0.0, self._random.uniform(-math.pi, math.pi)  # [s], [rad]
-        self._radius, self._speed, self._settings = radius, speed, settings
+        self._radius, self._speed, self.settings = radius, speed, settings
         self._half = _LEAST_HALF  # [m] of the extent of the object that is seen
         self._centre: Array | None = None  # (2,) [m] of the object at the last reading
         self._drifts = np.zeros(2)  # [m/s] of the object
@@ -169,11 +169,6 @@ class LocalLaw:
         else:
             v = self._go_round(gap, inward, centre, u)
         return self._apart(v, mates, moving, reading.walls)
-
-    @property
-    def settings(self) -> LocalLawSettings:
-        """Its settings."""
-        return self._settings
 
     def _look(self, reading: Reading, dt: float) -> Array:
         """``(2,)`` [m] of the object's centre; keeps half its extent and its velocity."""

@@ -16,13 +16,10 @@ def is_open(grid: OccupancyGrid) -> bool:
 def covered_region(grid: OccupancyGrid, margin: float) -> Array | None:
     """``(4, 2)`` [m] corners, counter-clockwise, of the rectangle about the free cells of a map,
     so far [m] from its sides; None where there is no room."""
-    free = ~grid.occupied
-    rows, columns = np.flatnonzero(free.any(axis=1)), np.flatnonzero(free.any(axis=0))
-    if not len(rows):
+    extent = grid.free_extent
+    if extent is None:
         return None
-    x, y = grid.origin
-    left, right = x + columns[0] * grid.resolution, x + (columns[-1] + 1) * grid.resolution
-    low, high = y + rows[0] * grid.resolution, y + (rows[-1] + 1) * grid.resolution
+    left, right, low, high = extent
     if min(right - left, high - low) <= 2.0 * margin:
         return None
     left, low, right, high = left + margin, low + margin, right - margin, high - margin

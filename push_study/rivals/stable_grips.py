@@ -10,11 +10,7 @@ from push_model.pushable_sides import pushable_sides
 from push_model.settings import bounded, settings
 from push_model.shapes import Side
 from push_model.specs import RobotSpec
-from push_model.stable_push import (
-    CurvatureLimits,
-    contact_on_side,
-    curvature_limits,
-)
+from push_model.stable_push import CurvatureLimits, contact_on_side, curvature_limits
 
 
 @settings

@@ -12,8 +12,8 @@ Only the abstract could be read. Filled in:
 - The programme (``stable_programme.py``) covers the whole way in steps of equal, free duration. Its
   cost is the time, the squared error of the last pose, and changes of omega. IPOPT solves it every
   ``period``; between two solves the robot drives as planned.
-- Obstacles: points of both outlines keep a margin from what the map has. Bodies that are not on the
-  map are not avoided.
+- Obstacles: the object's outline, the robot's body and the corners of its bumper keep a margin from
+  what the map has. Bodies that are not on the map are not avoided.
 - The side is the first from which a solve reaches the goal. A solve begins with the shortest way of
   the object on the map, or with a cubic between start and goal.
 - The robot drives to that side by this project's planner and tracker, and touches it straight on.
@@ -38,9 +38,7 @@ from push_model.distance_field import DistanceField
 from push_model.jobs import GoalRefused, JobError, JobPhase
 from push_model.settings import SettingsError
 from push_model.specs import ObjectSpec, RobotSpec
-from push_model.stable_push import (
-    shifted_limits,
-)
+from push_model.stable_push import shifted_limits
 from push_model.trajectory import Trajectory, line
 from push_mpc import LtvMpc, MpcSettings, TrackerSettings, TrajectoryTracker
 from push_mpc import Task as Track
