@@ -31,7 +31,7 @@ from push_ros.actions import GoalServer
 from push_ros.belief_feed import BeliefFeed
 from push_ros.conversions import circles_from_ros, path_to_ros
 from push_ros.diagnostics import Diagnostics
-from push_ros.map_feed import MapFeed
+from push_ros.map_feed import FirstMap, MapFeed
 from push_ros.names import names_of
 from push_ros.parameters import declare_settings
 from push_ros.process import run_node
@@ -96,9 +96,10 @@ class OptimizerNode(Node):
             names.team("plan_group_push"),
             check=lambda request: None,
             start=self._begin,
-            cancel=lambda: self._fail(PlanGroupPush.Result.CANCELED, "canceled"),
+            cancel=self._canceled,
             preempt=lambda request: self._preempt(),
         )
+        self._first_map = FirstMap(self, self._on_no_map)
         if failure := warm_up(self._item, self._robot, self._weights):
             self.get_logger().debug(f"warm-up: {failure}")
 
@@ -114,10 +115,13 @@ class OptimizerNode(Node):
         self._planner = None
 
     def _take_map(self, grid: Grid) -> None:
-        """A plan under way on another map is dropped and begun anew."""
+        """A request that waits is begun; a plan under way on another map is begun anew."""
         self._grid, self._planner = grid, None
-        if self._work is not None:
+        if self._first_map.awaited or self._work is not None:
             self._begin(self._request)
+
+    def _on_no_map(self) -> None:
+        self._fail(PlanGroupPush.Result.NO_MAP, "no map has been received on /map")
 
     def _take_up(self, belief: Belief) -> None:
         """Plan with what is believed of the object and the robots now."""
@@ -127,12 +131,20 @@ class OptimizerNode(Node):
 
     def _preempt(self) -> None:
         if self._server.active:
-            self._fail(PlanGroupPush.Result.CANCELED, "a new request replaces this one")
+            self._canceled("a new request replaces this one")
+
+    def _canceled(self, why: str = "canceled") -> None:
+        self._first_map.awaited = False
+        self._fail(PlanGroupPush.Result.CANCELED, why)
 
     def _begin(self, request: Any) -> None:
         self._request = request
         self._began = self._told = time.monotonic()
-        self._work = self._plan(request)
+        self._first_map.awaited, self._work = False, None
+        if self._grid is None:
+            self._first_map.wait()
+            return
+        self._work = self._plan(request, self._grid)
         self._continue()
 
     def _continue(self) -> None:
@@ -159,8 +171,6 @@ class OptimizerNode(Node):
             self._fail(result.INVALID_GOAL, str(error))
         except SettingsError as error:
             self._fail(result.UNKNOWN_OBJECT, str(error))
-        except _NoMap as error:
-            self._fail(result.NO_MAP, str(error))
         else:
             now = time.monotonic()
             if now - self._told > _SIGN_OF_LIFE:
@@ -182,15 +192,13 @@ class OptimizerNode(Node):
         self._path_publisher.publish(path_to_ros([way], now))
         self._server.finish(PlanGroupPush.Result(plan=message), success=True)
 
-    def _plan(self, request: Any) -> Work[GroupPlan]:
+    def _plan(self, request: Any, grid: Grid) -> Work[GroupPlan]:
         """The work on a request.
 
         Raises
         ------
-        _NoMap, SettingsError, InvalidMessage: in the first slice, of what is wrong with it. NoStep.
+        SettingsError, InvalidMessage: in the first slice, of what is wrong with it. NoStep.
         """
-        if self._grid is None:
-            raise _NoMap("no map has been received on /map")
         if request.object not in ("", self.object):
             raise SettingsError(f"unknown object '{request.object}'")
         if not request.robots or len(request.robots) != len(request.places):
@@ -204,7 +212,7 @@ class OptimizerNode(Node):
         goal = None if task else self._item.mass_pose(stamped_pose(request.goal, "the goal"))
         if self._planner is None:
             self._planner = StepPlanner(
-                *(self._grid, self._item, self._robot, self.settings, self._weights),
+                *(grid, self._item, self._robot, self.settings, self._weights),
                 self._believed,
             )
             yield
@@ -226,10 +234,6 @@ class OptimizerNode(Node):
             "last plan time": f"{self.last_time:.3f} s",
             "warning": "" if self._grid is not None else "no map yet",
         }
-
-
-class _NoMap(Exception):
-    """Raised for a request that came before the map."""
 
 
 def main() -> int:

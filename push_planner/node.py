@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Any
 
 from nav_msgs.msg import Path
-from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from push_model.arrays import Array
@@ -42,7 +41,7 @@ from push_ros.conversions import (
     trajectory_to_ros,
 )
 from push_ros.diagnostics import Diagnostics
-from push_ros.map_feed import MapFeed
+from push_ros.map_feed import FirstMap, MapFeed
 from push_ros.names import names_of
 from push_ros.parameters import declare_settings
 from push_ros.process import run_node
@@ -51,7 +50,6 @@ from push_ros.validation import FRAME, InvalidMessage, planar_pose
 from push_scenario.scenario import Scenario, load_scenario
 
 _SIGN_OF_LIFE = 0.5  # [s] wall time between feedback messages at most
-_MAP_PATIENCE = 5.0  # [s] wall time that a request waits for the first map
 
 
 class PlannerNode(Node):
@@ -77,7 +75,6 @@ class PlannerNode(Node):
         self._field: DistanceField | None = None  # of the grid
         self._work: Iterator[Progress] | None = None
         self._best: PushPlan | None = None
-        self._pending = False
         self._queued = False  # whether a slice waits for its turn
         self._draws = 0  # requests for pre-emptive pushes: each draws others
         self.plans = self.failures = 0
@@ -98,10 +95,8 @@ class PlannerNode(Node):
             cancel=self._canceled,
             preempt=lambda request: self._preempt(),
         )
-        self.create_service(PlanRobotPath, names.team("plan_robot_path"), self._on_robot_path)
-        self._watchdog = self.create_timer(
-            0.5, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME)
-        )
+        self._paths = names.team("plan_robot_path")
+        self._first_map = FirstMap(self, self._on_no_map)
         self._warm_up()
 
     @property
@@ -116,20 +111,20 @@ class PlannerNode(Node):
         self._planners.clear()
 
     def _take_map(self, grid: Grid) -> None:
-        """Another map than before."""
+        """Another map than before. Paths are offered from the first one on."""
+        if self._grid is None:
+            self.create_service(PlanRobotPath, self._paths, self._on_robot_path)
         self._grid, self._field = grid, None
         self._plan_anew()
 
     def _plan_anew(self) -> None:
         """The map or the belief is another one: a plan under way is dropped and begun anew."""
         self._planners.clear()
-        if self._pending or self._work is not None:
+        if self._first_map.awaited or self._work is not None:
             self._begin(self._request)
 
-    def _on_watchdog(self) -> None:
-        if self._pending and time.monotonic() - self._started > _MAP_PATIENCE:
-            self._pending = False
-            self._fail(PlanPush.Result.NO_MAP, "no map has been received on /map")
+    def _on_no_map(self) -> None:
+        self._fail(PlanPush.Result.NO_MAP, "no map has been received on /map")
 
     def _distances(self) -> DistanceField:
         assert self._grid is not None
@@ -170,9 +165,10 @@ class PlannerNode(Node):
         self._work = None
         try:
             self._request = request
-            self._pending = self._grid is None
-            if self._pending:
-                return  # until the map comes, or the watchdog loses patience
+            self._first_map.awaited = False
+            if self._grid is None:
+                self._first_map.wait()
+                return
             for stamped in (request.start, request.goal, request.robot_pose):
                 if stamped is request.robot_pose and not stamped.header.frame_id:
                     continue
@@ -282,13 +278,11 @@ class PlannerNode(Node):
             self._canceled("a new request replaces this one")
 
     def _canceled(self, why: str = "canceled") -> None:
-        self._pending = False
+        self._first_map.awaited = False
         self._fail(PlanPush.Result.CANCELED, why)
 
     def _on_robot_path(self, request: Any, response: Any) -> Any:
         try:
-            if self._grid is None:
-                raise NoRobotPath(response.NO_MAP, "no map has been received on /map")
             start, goal = planar_pose(request.start, "start"), planar_pose(request.goal, "goal")
             trajectory = plan_robot_path(
                 self._distances(),

@@ -54,8 +54,9 @@ DECIDES_NOTHING = {
     "push_supervisor/node.py:SupervisorNode._connect": LIVE,
     "push_planner/work.py:Work.__init__": COST,
     "push_planner/work.py:Work.counted": COST,
-    "push_planner/node.py:PlannerNode.__init__": "its timer looks for the first map, see below",
-    "push_planner/node.py:PlannerNode._on_watchdog": "refuses a request when no map has come, "
+    "push_ros/map_feed.py:FirstMap.__init__": "its timer looks for the first map, see below",
+    "push_ros/map_feed.py:FirstMap.wait": "see below",
+    "push_ros/map_feed.py:FirstMap._on_timer": "refuses a request when no map has come, "
     "which a lockstep run has before it starts",
     "push_planner/node.py:PlannerNode._begin": COST,
     "push_planner/rearranger_node.py:RearrangerNode.__init__": LIVE,

@@ -16,6 +16,7 @@ from push_model.occupancy import rasterise
 from push_model.settings import from_mapping
 from push_model.specs import EnvironmentSpec
 from push_msgs.action import PlanGroupPush
+from push_ros import map_feed
 from push_ros.conversions import grid_to_ros, pose_stamped_to_ros, pose_to_ros
 from push_ros.process import Spinner
 from push_ros.qos import LATCHED
@@ -87,15 +88,20 @@ def test_a_long_search_for_the_objects_way_is_cut_into_slices():
 class Client:
     """Asks an optimizer's node for steps of the triangle."""
 
-    def __init__(self):
-        scenario = scenario_from_mapping(TRIANGLE, "test", "test")
+    def __init__(self, mapped=True):
+        """mapped: whether there is a map from the start."""
+        scenario = self.scenario = scenario_from_mapping(TRIANGLE, "test", "test")
         self.node, self.optimizer = rclpy.create_node("client"), OptimizerNode(scenario)
         self.spinner = Spinner([self.optimizer, self.node])
         self.maps = self.node.create_publisher(OccupancyGrid, "/map", LATCHED)
         self.action = ActionClient(self.node, PlanGroupPush, "/plan_group_push")
-        self.maps.publish(grid_to_ros(scenario.grid, 0.0))
-        ready = lambda: self.optimizer.ready and self.action.server_is_ready()  # noqa: E731
+        if mapped:
+            self.map()
+        ready = lambda: self.optimizer.ready >= mapped and self.action.server_is_ready()  # noqa: E731
         assert self.spinner.until(ready, 30.0)
+
+    def map(self):
+        self.maps.publish(grid_to_ros(self.scenario.grid, 0.0))
 
     def send(self, goal):
         robots = [np.array([-1.2, y, 0.0]) for y in (-0.4, 0.4)]
@@ -120,6 +126,39 @@ def client(ros):
     client = Client()
     yield client
     client.spinner.close()
+
+
+@pytest.fixture
+def unmapped(ros):
+    client = Client(mapped=False)
+    yield client
+    client.spinner.close()
+
+
+def test_a_request_before_the_first_map_waits_for_it(unmapped):
+    """So it is with a goal that comes just after the start: the map may reach the job's owner
+    before the optimizer."""
+    handle = unmapped.send([0.3, 0.0, 0.0])
+    unmapped.spinner.until(lambda: False, 0.5)
+    assert unmapped.optimizer._work is None
+    unmapped.map()
+    assert unmapped.result(handle).error_code == R.NONE
+
+
+def test_a_request_that_is_cancelled_before_the_first_map_does_not_begin_with_it(unmapped):
+    handle = unmapped.send([0.3, 0.0, 0.0])
+    handle.cancel_goal_async()
+    assert unmapped.result(handle).error_code == R.CANCELED
+    unmapped.map()
+    assert unmapped.spinner.until(lambda: unmapped.optimizer.ready, 10.0)
+    unmapped.spinner.until(lambda: False, 0.5)
+    assert unmapped.optimizer._work is None and unmapped.optimizer.plans == 0
+
+
+def test_without_a_map_a_request_ends_and_says_why(unmapped, monkeypatch):
+    monkeypatch.setattr(map_feed, "PATIENCE", 0.5)
+    result = unmapped.result(unmapped.send([0.3, 0.0, 0.0]))
+    assert result.error_code == R.NO_MAP and result.error_msg == "no map has been received on /map"
 
 
 def test_a_cancel_is_heard_while_a_hard_plan_is_made(client):

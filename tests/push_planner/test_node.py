@@ -12,8 +12,10 @@ from push_model.occupancy import rasterise
 from push_model.specs import BoxSpec, EnvironmentSpec
 from push_msgs.action import PlanPush
 from push_msgs.msg import Circle, PushPlan
+from push_msgs.srv import PlanRobotPath
 from push_planner.node import PlannerNode
-from push_ros.conversions import grid_to_ros, pose_stamped_to_ros
+from push_ros import map_feed
+from push_ros.conversions import grid_to_ros, pose_stamped_to_ros, pose_to_ros
 from push_ros.process import Spinner
 from push_ros.qos import LATCHED
 from push_scenario.scenario import load_scenario
@@ -27,7 +29,8 @@ R = PlanPush.Result
 class Client:
     """Asks a planner node, on a map of its own."""
 
-    def __init__(self, scenario):
+    def __init__(self, scenario, mapped=True):
+        """mapped: whether there is a map from the start."""
         self.node = rclpy.create_node("client")
         self.planner = PlannerNode(scenario)
         self.spinner = Spinner([self.planner, self.node])
@@ -36,8 +39,9 @@ class Client:
         self.node.create_subscription(Path, "/push_path", self.paths.append, LATCHED)
         self.maps = self.node.create_publisher(OccupancyGrid, "/map", LATCHED)
         self.action = ActionClient(self.node, PlanPush, "/plan_push")
-        self.map(scenario.grid)
-        ready = lambda: self.planner.ready and self.action.server_is_ready()  # noqa: E731
+        if mapped:
+            self.map(scenario.grid)
+        ready = lambda: self.planner.ready >= mapped and self.action.server_is_ready()  # noqa: E731
         assert self.spinner.until(ready, 15.0)
 
     def map(self, grid):
@@ -58,8 +62,8 @@ class Client:
         return answer.result().result
 
 
-def make(**changes):
-    return Client(load_scenario("short").settings("planner", **changes))
+def make(mapped=True, **changes):
+    return Client(load_scenario("short").settings("planner", **changes), mapped)
 
 
 @pytest.fixture
@@ -124,6 +128,42 @@ def test_a_new_map_drops_a_plan_under_way_and_begins_it_anew(client):
     assert client.spinner.until(lambda: client.planner._work is not None, 10.0)
     client.map(rasterise(WALL))
     assert client.result(handle).error_code == R.GOAL_OCCUPIED
+
+
+@pytest.fixture
+def unmapped(ros):
+    client = make(mapped=False, improvement_rounds=0)
+    yield client
+    client.spinner.close()
+
+
+def test_a_request_before_the_first_map_waits_for_it(unmapped):
+    """So it is with a planner that has just been started again. Paths are offered with the map."""
+    paths = unmapped.node.create_client(PlanRobotPath, "/plan_robot_path")
+    handle = unmapped.send()
+    unmapped.spinner.until(lambda: False, 0.5)
+    assert unmapped.planner._work is None and not paths.service_is_ready()
+    unmapped.map(load_scenario("short").grid)
+    assert unmapped.result(handle).error_code == R.NONE
+    assert unmapped.spinner.until(paths.service_is_ready, 10.0)
+    answer = paths.call_async(PlanRobotPath.Request(start=pose_to_ros(START - [0.3, 0.0, 0.0])))
+    assert unmapped.spinner.until(answer.done, 10.0) and answer.result().error_code == 0
+
+
+def test_a_request_that_is_cancelled_before_the_first_map_does_not_begin_with_it(unmapped):
+    handle = unmapped.send()
+    handle.cancel_goal_async()
+    assert unmapped.result(handle).error_code == R.CANCELED
+    unmapped.map(load_scenario("short").grid)
+    assert unmapped.spinner.until(lambda: unmapped.planner.ready, 10.0)
+    unmapped.spinner.until(lambda: False, 0.5)
+    assert unmapped.planner._work is None and not unmapped.plans
+
+
+def test_without_a_map_a_request_ends_and_says_why(unmapped, monkeypatch):
+    monkeypatch.setattr(map_feed, "PATIENCE", 0.5)
+    result = unmapped.result(unmapped.send())
+    assert result.error_code == R.NO_MAP and result.error_msg == "no map has been received on /map"
 
 
 def test_what_is_too_heavy_is_not_planned(ros):
