@@ -20,6 +20,7 @@ from push_ros.conversions import circles_to_ros, pose_stamped_to_ros, pose_to_ro
 from push_ros.hosting import Hosting
 from push_ros.method_node import PATIENCE, MethodNode
 from push_ros.process import run_node
+from push_ros.scheduling import Urgency
 from push_ros.task_server import TaskAction
 from push_ros.validation import InvalidMessage, finite
 from push_scenario.scenario import Scenario
@@ -154,7 +155,7 @@ def make(
 
 def main() -> int:
     """Entry point of the process: ``--ros-args`` on its command line."""
-    return run_node(make)
+    return run_node(make, urgency=Urgency.CONTROL)
 
 
 if __name__ == "__main__":

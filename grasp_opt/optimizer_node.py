@@ -36,6 +36,7 @@ from push_ros.names import names_of
 from push_ros.parameters import declare_settings
 from push_ros.process import run_node
 from push_ros.qos import LATCHED
+from push_ros.scheduling import Urgency
 from push_ros.validation import InvalidMessage, planar_pose, stamped_pose
 from push_scenario.scenario import Scenario, load_scenario
 
@@ -238,7 +239,7 @@ class OptimizerNode(Node):
 
 def main() -> int:
     """Entry point of the process: ``--ros-args`` on its command line."""
-    return run_node(OptimizerNode)
+    return run_node(OptimizerNode, urgency=Urgency.BACKGROUND)
 
 
 if __name__ == "__main__":

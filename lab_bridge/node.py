@@ -38,6 +38,7 @@ from push_ros.parameters import declare_settings
 from push_ros.process import run_node
 from push_ros.qos import BELIEF, LATCHED, STATUS, STREAM
 from push_ros.report_conversions import belief_to_ros
+from push_ros.scheduling import Urgency
 from push_ros.services import CALLS, Services
 from push_scenario.lab import EPuck2Link, LabSettings, TransformSource
 from push_scenario.scenario import Scenario, load_scenario
@@ -256,7 +257,7 @@ class LabBridgeNode(Node):
 
 def main() -> int:
     """Entry point of the process: ``--ros-args`` on its command line."""
-    return run_node(partial(LabBridgeNode))
+    return run_node(partial(LabBridgeNode), urgency=Urgency.WORLD)
 
 
 if __name__ == "__main__":

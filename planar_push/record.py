@@ -19,6 +19,7 @@ def run(arguments: argparse.Namespace) -> int:
     from push_bringup.preparation import check_bag
     from push_record.recorder import LIVE, RecorderNode, heard_scenario
     from push_ros.process import run_node
+    from push_ros.scheduling import Urgency
     from push_scenario.scenario import load_scenario
 
     check_namespace(arguments.namespace)
@@ -33,4 +34,4 @@ def run(arguments: argparse.Namespace) -> int:
             Path(arguments.out), scenario, namespace=arguments.namespace, about=LIVE
         )
 
-    return int(run_node(make, []))
+    return int(run_node(make, [], urgency=Urgency.BACKGROUND))

@@ -20,6 +20,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Serve until a signal. The bodies are received from the bridge."""
     from push_bringup.background_suite import BackgroundSuite
     from push_ros.process import run_node
+    from push_ros.scheduling import Urgency
     from push_scenario.scenario import load_scenario
     from push_view.page_server import PageServer
     from push_view.viewer_node import ViewerNode
@@ -40,7 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     words = ["--ros-args", "-r", f"__ns:=/{arguments.namespace.strip('/')}"]
     try:
-        return int(run_node(make, words if arguments.namespace else []))
+        return int(run_node(make, words if arguments.namespace else [], urgency=Urgency.BACKGROUND))
     except OSError as error:
         print(f"error: port {arguments.port}: {error.strerror}; try --port 0", file=sys.stderr)
         return 2

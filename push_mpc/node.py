@@ -36,6 +36,7 @@ from push_ros.pose_feed import Frame
 from push_ros.process import run_node
 from push_ros.qos import COMMAND, STATUS
 from push_ros.report_conversions import report_to_ros
+from push_ros.scheduling import Urgency
 from push_ros.validation import InvalidMessage, finite, planar_pose
 from push_scenario.scenario import Scenario
 
@@ -262,7 +263,7 @@ class ControllerNode(FollowerNode):
 
 def main() -> int:
     """Entry point of the process: ``--ros-args`` on its command line."""
-    return run_node(ControllerNode)
+    return run_node(ControllerNode, urgency=Urgency.CONTROL)
 
 
 if __name__ == "__main__":

@@ -29,6 +29,7 @@ from push_ros.parameters import declare_settings
 from push_ros.pose_feed import Frame
 from push_ros.process import run_node
 from push_ros.qos import COMMAND, STREAM
+from push_ros.scheduling import Urgency
 from push_ros.validation import InvalidMessage
 from push_scenario.scenario import Scenario
 
@@ -178,7 +179,7 @@ class TorqueControllerNode(FollowerNode):
 
 def main() -> int:
     """Entry point of the process: ``--ros-args`` on its command line."""
-    return run_node(TorqueControllerNode)
+    return run_node(TorqueControllerNode, urgency=Urgency.CONTROL)
 
 
 if __name__ == "__main__":

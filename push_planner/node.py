@@ -46,6 +46,7 @@ from push_ros.names import names_of
 from push_ros.parameters import declare_settings
 from push_ros.process import run_node
 from push_ros.qos import LATCHED
+from push_ros.scheduling import Urgency
 from push_ros.validation import FRAME, InvalidMessage, planar_pose
 from push_scenario.scenario import Scenario, load_scenario
 
@@ -312,7 +313,7 @@ class PlannerNode(Node):
 
 def main() -> int:
     """Entry point of the process: ``--ros-args`` on its command line."""
-    return run_node(PlannerNode)
+    return run_node(PlannerNode, urgency=Urgency.BACKGROUND)
 
 
 if __name__ == "__main__":

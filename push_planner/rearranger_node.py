@@ -33,6 +33,7 @@ from push_ros.parameters import declare_settings
 from push_ros.pose_feed import Frame, PoseFeed
 from push_ros.process import run_node
 from push_ros.qos import COMMAND, LATCHED
+from push_ros.scheduling import Urgency
 from push_ros.services import CALLS, Services
 from push_ros.validation import InvalidMessage, check_frame
 from push_scenario.scenario import Scenario, load_scenario
@@ -373,7 +374,7 @@ class RearrangerNode(Node):
 
 def main() -> int:
     """Entry point of the process: ``--ros-args`` on its command line."""
-    return run_node(RearrangerNode)
+    return run_node(RearrangerNode, urgency=Urgency.BACKGROUND)
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ from push_record.contents import bag_scenario
 from push_record.topics import Topic, shown_topics
 from push_ros.names import names_of
 from push_ros.process import run_node
+from push_ros.scheduling import Urgency
 
 _PERIOD = 0.005  # [s] wall time between checks of the clock
 _LONGEST = 1e6  # [s] length of a bag; a stamp beyond it belongs to another clock
@@ -100,7 +101,7 @@ class PlayerNode(Node):
 
 def main() -> int:
     """Entry point of the process: ``--ros-args`` on its command line."""
-    return int(run_node(PlayerNode))
+    return int(run_node(PlayerNode, urgency=Urgency.BACKGROUND))
 
 
 if __name__ == "__main__":

@@ -20,6 +20,7 @@ from push_ros.latched import hear_latched
 from push_ros.names import names_of
 from push_ros.process import Spinner, run_node
 from push_ros.qos import CLOCK, deep
+from push_ros.scheduling import Urgency
 from push_scenario.scenario import Scenario, load_scenario, scenario_from_text
 
 LIVE = {"pace": "live"}
@@ -141,7 +142,7 @@ class RecorderNode(Node):
 
 def main() -> int:
     """Entry point of the process: ``--ros-args`` on its command line."""
-    return int(run_node(partial(RecorderNode, about=LIVE)))
+    return int(run_node(partial(RecorderNode, about=LIVE), urgency=Urgency.BACKGROUND))
 
 
 if __name__ == "__main__":

@@ -25,6 +25,7 @@ from push_ros.pose_feed import Frame, PoseFeed
 from push_ros.process import run_node
 from push_ros.qos import BELIEF
 from push_ros.report_conversions import belief_to_ros
+from push_ros.scheduling import Urgency
 from push_scenario.scenario import Scenario, load_scenario
 
 _SHOWN = 10.0  # [s] of pose time for which a contradiction is a warning
@@ -163,7 +164,7 @@ class EstimatorNode(Node):
 
 def main() -> int:
     """``ros2 run`` entry point."""
-    return run_node(EstimatorNode)
+    return run_node(EstimatorNode, urgency=Urgency.BACKGROUND)
 
 
 if __name__ == "__main__":

@@ -47,6 +47,7 @@ from push_ros.pose_feed import Frame, PoseFeed
 from push_ros.process import run_node
 from push_ros.qos import STATUS
 from push_ros.report_conversions import report_to_ros
+from push_ros.scheduling import Urgency
 from push_ros.task_outputs import TaskOutputs
 from push_ros.task_server import TaskServer
 from push_scenario.scenario import Scenario, load_scenario
@@ -368,7 +369,7 @@ class MethodNode(Node):
 
 def main() -> int:
     """Entry point of the process: ``--ros-args -p method:=NAME`` on its command line."""
-    return run_node(MethodNode)
+    return run_node(MethodNode, urgency=Urgency.CONTROL)
 
 
 if __name__ == "__main__":

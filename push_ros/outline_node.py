@@ -31,6 +31,7 @@ from push_ros.pose_feed import Frame, PoseFeed
 from push_ros.process import run_node
 from push_ros.qos import BELIEF
 from push_ros.report_conversions import belief_to_ros
+from push_ros.scheduling import Urgency
 from push_scenario.scenario import Scenario, load_scenario
 
 KIND = "outline_estimator"
@@ -192,7 +193,7 @@ def _disc(radius: float) -> Array:
 
 def main() -> int:
     """``ros2 run`` entry point."""
-    return run_node(OutlineNode)
+    return run_node(OutlineNode, urgency=Urgency.BACKGROUND)
 
 
 if __name__ == "__main__":

@@ -21,6 +21,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from push_model.settings import SettingsError
+from push_ros.scheduling import RealTimePriority, Urgency, go_to_background
 
 
 def prepare_environment(environment: dict[str, str] | None = None) -> dict[str, str]:
@@ -169,10 +170,16 @@ def _destroy(node: Node) -> None:
         node.destroy_node()
 
 
-def run_node(make: Callable[[], Node], arguments: Sequence[str] | None = None) -> int:
+def run_node(
+    make: Callable[[], Node],
+    arguments: Sequence[str] | None = None,
+    urgency: Urgency = Urgency.ORDINARY,
+) -> int:
     """Run one node until a signal; returns an exit code.
 
     arguments: of the command line; those of this process when they are not given.
+    urgency: how soon it must run. A node whose attribute ``in_real_time`` is False has no real-time
+    priority.
     SIGINT and SIGTERM end the spinning; the node's ``stop`` method, if it has one, is called while
     it can still publish. Before that, its method ``finish``, if it has one, is called with the
     spinner, so that it can wait for messages that are still under way.
@@ -186,13 +193,22 @@ def run_node(make: Callable[[], Node], arguments: Sequence[str] | None = None) -
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, on_signal)
+    if urgency is Urgency.BACKGROUND:
+        go_to_background()
     rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     spinner: Spinner | None = None
+    priority: RealTimePriority | None = None
     try:
         node = make()
         spinner = Spinner([node])
+        paced = getattr(node, "in_real_time", True)
+        log = node.get_logger()
+        priority = RealTimePriority(urgency if paced else Urgency.ORDINARY, log.info)
+        if priority.refusal and urgency is Urgency.WORLD:  # one line in a suite, not one per node
+            log.info(priority.refusal)
         while rclpy.ok() and not stopping:
             spinner.once(0.1)
+            priority.look()
         finish = getattr(node, "finish", None)
         if finish is not None:
             finish(spinner)
@@ -205,6 +221,8 @@ def run_node(make: Callable[[], Node], arguments: Sequence[str] | None = None) -
     except KeyboardInterrupt:
         pass
     finally:
+        if priority is not None:
+            priority.close()
         if spinner is not None:
             spinner.close()
         rclpy.try_shutdown()

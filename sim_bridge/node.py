@@ -20,6 +20,7 @@ from push_ros.lone_bridge import refuse_second_bridge
 from push_ros.names import Names, space
 from push_ros.parameters import declare_settings
 from push_ros.process import run_node
+from push_ros.scheduling import Urgency
 from push_ros.services import CALLS, Services
 from push_ros.validation import FARTHEST
 from push_scenario.events import Event
@@ -127,6 +128,11 @@ class BridgeNode(Node):
     def time(self) -> float:
         """[s] sim time."""
         return float(self.tick / self._rate)
+
+    @property
+    def in_real_time(self) -> bool:
+        """Whether robots and controllers must keep a pace, which they need not in lockstep."""
+        return not self.settings.lockstep
 
     @property
     def applied_latency(self) -> tuple[float, float]:
@@ -328,7 +334,7 @@ def _number_of(stamp: float) -> int:
 
 def main() -> int:
     """Entry point of the process: ``--ros-args`` on its command line."""
-    return run_node(BridgeNode)
+    return run_node(BridgeNode, urgency=Urgency.WORLD)
 
 
 if __name__ == "__main__":

@@ -30,6 +30,7 @@ from push_ros.parameters import declare_settings
 from push_ros.pose_feed import Frame, PoseFeed
 from push_ros.process import run_node
 from push_ros.qos import CHATTER, COMMAND
+from push_ros.scheduling import Urgency
 from push_ros.validation import InvalidMessage
 from push_scenario.scenario import Scenario, load_scenario
 from swarm_push.agent import Agent, AgentSettings, AgentState
@@ -192,7 +193,7 @@ class SwarmAgentNode(Node):
 
 def main() -> int:
     """Entry point of the process: ``--ros-args`` on its command line."""
-    return run_node(SwarmAgentNode)
+    return run_node(SwarmAgentNode, urgency=Urgency.CONTROL)
 
 
 if __name__ == "__main__":

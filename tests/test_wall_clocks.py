@@ -51,6 +51,7 @@ DECIDES_NOTHING = {
     "push_ros/diagnostics.py:Diagnostics.__init__": PERSON,
     "push_ros/diagnostics.py:Diagnostics.publish": PERSON,
     "push_ros/process.py:Spinner.until": "a limit that its caller sets, who is no node",
+    "push_ros/scheduling.py:RealTimePriority": "when the system runs a process, not what it does",
     "push_supervisor/node.py:SupervisorNode._connect": LIVE,
     "push_planner/work.py:Work.__init__": COST,
     "push_planner/work.py:Work.counted": COST,

@@ -16,10 +16,12 @@ from std_msgs.msg import String
 
 from push_msgs.action import MoveObject
 from push_msgs.msg import JobState
+from push_ros import process
 from push_ros.claims import claim_world, own_domain, world_is_claimed
 from push_ros.latched import has_publisher, hear_latched
-from push_ros.process import INTERRUPTS, Spinner, heard
+from push_ros.process import INTERRUPTS, Spinner, heard, run_node
 from push_ros.qos import COMMAND, LATCHED
+from push_ros.scheduling import RealTimePriority, Urgency
 
 
 def test_an_interrupt_waits_for_the_end_of_a_callback(ros, capfd):
@@ -172,3 +174,36 @@ def test_a_claim_ends_with_its_process_and_one_of_another_user_counts(domain, tm
         process.kill()
         process.wait()
     assert not world_is_claimed(name, "/")
+
+
+@pytest.mark.parametrize("in_real_time", [True, False])
+def test_a_node_runs_where_no_real_time_priority_is_permitted(monkeypatch, capfd, in_real_time):
+    """The bridge says so in one line; in lockstep it asks for none."""
+
+    def refuse(*_):
+        raise PermissionError(1, "Operation not permitted")
+
+    before = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)}
+    monkeypatch.setattr(os, "sched_setscheduler", refuse)
+    asked = []
+
+    def ask(urgency, tell):
+        asked.append(urgency)
+        return RealTimePriority(urgency, tell)
+
+    monkeypatch.setattr(process, "RealTimePriority", ask)
+
+    def make():
+        node = rclpy.create_node("world")
+        node.in_real_time = in_real_time
+        node.create_timer(0.02, lambda: os.kill(os.getpid(), signal.SIGTERM))
+        return node
+
+    try:
+        assert run_node(make, [], Urgency.WORLD) == 0
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    assert asked == [Urgency.WORLD if in_real_time else Urgency.ORDINARY]
+    said = capfd.readouterr()
+    assert (said.out + said.err).count("no real-time priority") == in_real_time
