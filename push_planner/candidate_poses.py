@@ -37,6 +37,10 @@ class Candidates:
         return Candidates(self.poses[good], self.way[good])
 
 
+NOTHING = Candidates(np.zeros((0, 3)), np.zeros(0))
+"""No poses."""
+
+
 def along_guide(
     scene: PushScene, guide: GuidePath, start: Array, goal: Array, most: int
 ) -> Candidates:

@@ -6,11 +6,11 @@ bounded curvature (dubins_bound.py). Obstacles lengthen it: the object's centre 
 distance to them, and it moves at most ``fastest`` times as far as the robot. The cost (2.10) of a
 plan is therefore at least the smallest of these:
 
-- one run: the time of its bound, and that of one push to begin and to end;
+- one run: the time of its bound, and that to speed up and to brake;
 - two runs: the smallest sum of two bounds over all poses at which the side is changed, and the
-  times of two pushes to begin and of one change;
+  times to speed up and to brake twice and of one change;
 - three runs or more: the distance that the centre must move, or the length in which the object can
-  turn as far as it must, and the times of three pushes to begin and of two changes.
+  turn as far as it must, and the times to speed up and to brake three times and of two changes.
 
 The first push needs room for the robot at the start, the last one at the goal; other sides do not
 count there. The smallest sum over poses is found by branch and bound. A box of positions and
@@ -28,83 +28,19 @@ import numpy as np
 
 from push_model import se2
 from push_model.arrays import Array
-from push_model.distance_field import DistanceField, lookup
-from push_model.flood import Flood
-from push_planner.dubins_bound import least_length
-from push_planner.guide_path import origin_floor
-from push_planner.scene import PushScene
+from push_model.distance_field import lookup
+from push_planner.least_way import way_at
+from push_planner.run_bounds import run_length, run_time, stands, wrapped
+from push_planner.run_ends import RunEnds
+from push_planner.scene import TURNING, PushScene
+from push_planner.single_run import least_single_run
 
-_STRIDE, _PLACES = 2, 100000  # [lattice spacings] between places of a flood; so many about at most
-_OCTAGON = math.cos(math.pi / 8.0)  # of a path of straight and diagonal steps: the shortest one
-_ENDS = 1.0  # [strides] that such a path may be longer than that (tested: none was)
+_SMALL = 0.1  # [m] that bodies move in a box in which it is asked whether they can stand
 _BATCH = 64  # boxes that are divided at a time
 _WORTH = 0.003  # of the cost: boxes that may save less are not divided
 
 
 @numba.njit(cache=True)  # infinities: no fast mathematics
-def _way(ways: Any, x: float, y: float, half: float, ox: float, oy: float, scale: float) -> float:
-    """Least value [m] at the places in and about a square; infinite if it has none.
-
-    The square is ``2 half`` [m] wide. The values at both sides of a wall differ by more than the
-    square is wide, so that the value in the middle says nothing of the others.
-
-    ways: ``(levels, rows, columns)`` [m] from ``_windows``.
-    """
-    levels, rows, columns = ways.shape
-    bottom = max(0, int(math.floor((y - half - oy) * scale)))
-    left = max(0, int(math.floor((x - half - ox) * scale)))
-    top = min(rows - 1, int(math.floor((y + half - oy) * scale)) + 1)
-    right = min(columns - 1, int(math.floor((x + half - ox) * scale)) + 1)
-    if top < bottom or right < left:
-        return math.inf
-    level = min(levels - 1, int(math.log2(min(top - bottom, right - left) + 1)))
-    size = 1 << level
-    least = math.inf
-    i = bottom
-    while True:
-        j = left
-        while True:
-            least = min(least, ways[level, i, j])
-            if j + size > right:
-                break
-            j = min(j + size, right - size + 1)
-        if i + size > top:
-            break
-        i = min(i + size, top - size + 1)
-    return float(least)
-
-
-def _windows(ways: Array) -> Array:
-    """``(levels, rows, columns)`` least values of windows ``(2**level, 2**level)``, each at its
-    first row and column; windows at the end are cut off."""
-    levels = [ways]
-    size = 1
-    while 2 * size <= min(ways.shape):
-        pairs = levels[-1].copy()
-        pairs[:-size] = np.minimum(pairs[:-size], levels[-1][size:])
-        whole = pairs.copy()
-        whole[:, :-size] = np.minimum(whole[:, :-size], pairs[:, size:])
-        levels.append(whole)
-        size *= 2
-    return np.array(levels)
-
-
-@numba.njit(cache=True)
-def _run(
-    x: float, y: float, theta: float, bx: float, by: float, angle: float, radii: Any,
-    off: float, slack: float,
-) -> float:  # fmt: skip
-    """``least_length`` from the pose (x, y, theta) to about the pose (bx, by, angle)."""
-    c, s = math.cos(theta), math.sin(theta)
-    dx, dy = bx - x, by - y
-    return float(
-        least_length(
-            c * dx + s * dy, c * dy - s * dx, angle - theta, radii[0], radii[1], off, slack
-        )
-    )
-
-
-@numba.njit(cache=True)
 def _of_boxes(
     boxes: Any,
     starts: Any,
@@ -113,13 +49,15 @@ def _of_boxes(
     arrives: Any,
     contacts: Any,
     radii: Any,
-    changes: Any,
     fastest: Any,
-    pace: float,
+    changes: Any,
+    speeds: Any,
     begin: float,
-    ways: Any,
-    place_scale: float,
-    least: float,
+    gone: Any,
+    left: Any,
+    places: Any,
+    keeps: Any,
+    bodies: Any,
     field: Any,
     ox: float,
     oy: float,
@@ -131,91 +69,74 @@ def _of_boxes(
     ----------
     boxes: ``(n, 5)`` x, y [m], theta [rad] of the centre, half the width in x and y [m], in theta
         [rad].
-    starts, goals: ``(sides, 3)`` poses of the robot in contact at the start and at the goal.
-    leaves, arrives: ``(sides,)`` whether the robot has room there.
-    contacts: ``(sides, 3)`` the same in the frame of the object.
-    radii: ``(sides, 2)`` [m] smallest turning radii to the left and to the right.
+    starts, leaves, goals, arrives, contacts, radii, fastest: see ``RunEnds``.
     changes: ``(sides, sides)`` [s] of a change of the side; infinite on the diagonal.
-    fastest: ``(sides,)`` how far the centre moves at most while the robot drives 1 m.
-    pace: [s/m] of a push. begin: [s] that each push takes longer.
-    ways: ``(2, levels, rows, columns)`` [m] least way of the centre from the start and to the goal,
-        see ``_windows``.
-    place_scale: [1/m] places of ``ways`` per metre.
-    least: [m] distance of the centre to obstacles.
+    speeds, begin: see ``run_time``; [s] that each run takes longer.
+    gone, left, places: levels of ``RunEnds.gone`` and ``.left``; their ox, oy and scale.
+    keeps: [m] distance to obstacles of the centre, of the bodies, of the robot behind a contact.
+    bodies: outlines of object and robot, radii [m], and ``(sides,)`` [m] from contact to behind it.
     """
     n, sides = boxes.shape[0], contacts.shape[0]
     result = np.full(n, math.inf)
     first, second = np.empty(sides), np.empty(sides)
+    object_points, robot_points, object_radius, robot_radius, backs = bodies
+    rounding = 1.0 / scale  # what is looked up is a lower bound, by less than that
     for k in range(n):
         x, y, theta, half, slack = boxes[k]
         off = half * math.sqrt(2.0)
-        # What is looked up is a lower bound, by less than a spacing of the lattice.
-        if lookup(field, x, y, ox, oy, scale) + off + 1.0 / scale < least:
+        if lookup(field, x, y, ox, oy, scale) + off + rounding < keeps[0]:
             continue
-        gone = _way(ways[0], x, y, half, ox, oy, place_scale)
-        left = _way(ways[1], x, y, half, ox, oy, place_scale)
+        about = off + 2.0 * object_radius * math.sin(0.5 * min(slack, math.pi))
+        if about < _SMALL and not stands(
+            object_points, object_radius, x, y, theta, keeps[1] - about - rounding,
+            field, ox, oy, scale,
+        ):  # fmt: skip
+            continue
+        way = way_at(gone, x, y, half, places[0], places[1], places[2])
+        rest = way_at(left, x, y, half, places[0], places[1], places[2])
         c, s = math.cos(theta), math.sin(theta)
         for side in range(sides):
+            first[side] = second[side] = math.inf
             gx, gy, turned = contacts[side]
             rx, ry, angle = x + c * gx - s * gy, y + s * gx + c * gy, theta + turned
             around = off + 2.0 * math.hypot(gx, gy) * math.sin(0.5 * slack)
+            if around < _SMALL:
+                back = backs[side]
+                bx, by = rx - back * math.cos(angle), ry - back * math.sin(angle)
+                sway = around + 2.0 * back * math.sin(0.5 * slack) + rounding
+                if lookup(field, bx, by, ox, oy, scale) + sway < keeps[2]:
+                    continue
+                sway = around + 2.0 * robot_radius * math.sin(0.5 * slack) + rounding
+                if not stands(
+                    robot_points, robot_radius, rx, ry, angle, keeps[1] - sway, field, ox, oy, scale
+                ):
+                    continue
             there, here = radii[side], radii[side, ::-1]
             ax, ay, before = starts[side]
-            bx, by, after = goals[side]
-            first[side] = second[side] = math.inf
             if leaves[side]:
-                length = _run(ax, ay, before, rx, ry, angle, there, around, slack)
-                first[side] = max(length, gone / fastest[side])
+                length = run_length(ax, ay, before, rx, ry, angle, there, around, slack)
+                turn = max(0.0, abs(wrapped(angle - before)) - slack)
+                first[side] = run_time(max(length, way / fastest[side]), turn, speeds)
+            bx, by, after = goals[side]
             if arrives[side]:
                 # The way into the goal, driven backward: left turns become right ones.
-                length = _run(bx, by, after + math.pi, rx, ry, angle + math.pi, here, around, slack)
-                second[side] = max(length, left / fastest[side])
+                length = run_length(
+                    bx, by, after + math.pi, rx, ry, angle + math.pi, here, around, slack
+                )
+                turn = max(0.0, abs(wrapped(after - angle)) - slack)
+                second[side] = run_time(max(length, rest / fastest[side]), turn, speeds)
         for a in range(sides):
             for b in range(sides):
-                result[k] = min(result[k], pace * (first[a] + second[b]) + changes[a, b])
+                result[k] = min(result[k], first[a] + second[b] + changes[a, b])
         result[k] += 2.0 * begin
     return result
-
-
-def _stride(field: DistanceField) -> int:
-    """[lattice spacings] between places; more than the least one on a large map."""
-    return max(_STRIDE, math.ceil(math.sqrt(field.values.size / _PLACES)))
-
-
-def _ways(field: DistanceField, pose: Array, least: float) -> Array:
-    """Lower bounds [m] of the way of the centre between a pose and the places of a flood, see
-    ``_windows``.
-
-    Every point with the clearance ``least`` has a place about it with less than half a diagonal
-    less.
-    """
-    ox, oy, scale = field.args
-    stride = _stride(field)
-    need = max(0.0, least * scale - stride / math.sqrt(2.0))
-    flood = Flood(field.values, np.zeros((0, 5)), need, stride)
-    rows, columns = flood.state.shape
-    u, v = (pose[0] - ox) * scale / stride, (pose[1] - oy) * scale / stride
-    about = [(i, j) for i in (int(v), int(v) + 1) for j in (int(u), int(u) + 1)]
-    flood.begin(np.array([(i, j, 0) for i, j in about if i < rows and j < columns]))
-    flood.step(rows * columns)
-    return _windows(np.maximum(_OCTAGON * flood.lengths - _ENDS * stride, 0.0) / scale)
-
-
-def least_way(field: DistanceField, start: Array, goal: Array, least: float) -> float:
-    """Lower bound [m] of the way of a point from one position ``(2,)`` to another one.
-
-    least: [m] distance that the point keeps from obstacles.
-    """
-    ways = _ways(field, start, least)
-    return float(_way(ways, *goal[:2], 0.0, *field.args[:2], field.args[2] / _stride(field)))
 
 
 class CostBound:
     """The bound for one start and one goal in a scene.
 
-    value: [s] the cost of no plan is less. one, several: [s] the same for plans of one run, and of
-    three or more; ``value`` is not higher. fastest: ``(sides,)`` how far the centre of mass moves
-    at most while the robot drives 1 m.
+    one, two, several: [s] the cost of no plan of one run, of two runs, of three or more is less.
+    ends: what is known of the runs.
     """
 
     def __init__(self, scene: PushScene, start: Array, goal: Array) -> None:
@@ -226,50 +147,70 @@ class CostBound:
         scene: with at least one side to push on.
         start, goal: ``(3,)`` [m, m, rad] poses of the object's centre of mass, world frame.
         """
-        settings, sides, field = scene.settings, scene.sides, scene.field
-        contacts = np.array([se2.inverse(s.grasp) for s in sides])
-        starts, goals = (np.array([s.robot_pose(pose) for s in sides]) for pose in (start, goal))
-        keeps = scene.leaving(start)
-        leaves = np.array([scene.has_room(p, s, keeps) for p, s in zip(starts, sides, strict=True)])
-        arrives = np.array([scene.has_room(p, s) for p, s in zip(goals, sides, strict=True)])
-        limits = np.array([[s.trusted.maximum, s.trusted.minimum] for s in sides])
-        radii = 1.0 / np.abs(limits)
-        x, y = np.array([s.grasp[:2] for s in sides]).T[:, :, None]
-        fastest = np.maximum(np.hypot(1.0 - limits * y, limits * x).max(axis=1), 1.0)
-        pace, begin, changes = scene.time.pace, scene.time.begin, scene.time.changes.copy()
+        settings, time = scene.settings, scene.time
+        self._scene, self._start, self._goal = scene, start, goal
+        ends = self.ends = RunEnds.of(scene, start, goal)
+        changes = time.changes.copy()
         np.fill_diagonal(changes, math.inf)
-        floor = origin_floor(scene.shape)
-        least = floor + min(scene.leaving(start), settings.safety_distance) if floor > 0.0 else 0.0
-        ways = np.array([_ways(field, pose, least) for pose in (start, goal)])
-        places = field.args[2] / _stride(field)
-        self.fastest = fastest
+        speeds = time.speeds
+        behind = scene.robot.footprint_radius + TURNING * settings.safety_distance
         self._known = (
-            *(starts, leaves, goals, arrives, contacts, radii, changes, fastest, pace, begin),
-            *(ways, places, least, field.values, *field.args),
+            *(ends.starts, ends.leaves, ends.goals, ends.arrives, ends.contacts, ends.radii),
+            *(ends.fastest, changes, speeds, time.begin, ends.gone.levels, ends.left.levels),
+            ends.gone.places,
+            (ends.least, ends.nearest, behind),
+            scene.bodies,
+            scene.field.values,
+            *scene.field.args,
         )
-        speed, change = float(fastest.max()), float(changes.min())
+        speed, change = float(ends.fastest.max()), float(changes.min())
         straight = math.hypot(*(goal - start)[:2])
-        way = float(_way(ways[0], *goal[:2], 0.0, *field.args[:2], places))
         turn = abs(float(se2.wrap(goal[2] - start[2])))
-        length = max(max(way, straight) / speed, turn * float(radii.min()))
-        both = np.flatnonzero(leaves & arrives)
-        runs = [_run(*starts[k], *goals[k], radii[k], 0.0, 0.0) for k in both]
-        self.one = begin + pace * max(length, min(runs, default=math.inf))
-        self.several = 3.0 * begin + 2.0 * change + pace * length
-        self._fixed, self._speed = 2.0 * begin + change, speed / pace
-        self.value = min(self.one, self.several, self._fixed + pace * length)
+        length = max(max(ends.gone.at(goal), straight) / speed, turn * float(ends.radii.min()))
+        least = run_time(length, 0.0, speeds)
+        self._runs = np.full(len(scene.sides), math.inf)
+        for k in np.flatnonzero(ends.leaves & ends.arrives):
+            shortest = run_length(*ends.starts[k], *ends.goals[k], ends.radii[k], 0.0, 0.0)
+            self._runs[k] = run_time(max(length, shortest), turn, speeds)
+        self.one = max(time.begin + float(self._runs.min()), time.begin + least)
+        self.several = 3.0 * time.begin + 2.0 * change + least
+        self._fixed, self._speed = 2.0 * time.begin + change, speed / time.pace
+        self.two = self._fixed + least
         self._centre = 0.5 * (start + goal)[:2]
-        self._turning = float(radii.mean())
+        self._turning = float(ends.radii.mean())
+
+    @property
+    def value(self) -> float:
+        """[s] the cost of no plan is less."""
+        return float(min(self.one, self.two, self.several))
 
     def run(self, boxes: int, cost: float = math.inf) -> Iterator[None]:
         """Raise the bound by dividing up to so many boxes. Yields after each slice.
 
         cost: [s] of a known plan; the bound is not raised above it.
         """
-        most = min(self.one, self.several, cost)
+        if boxes > 0:
+            yield from self._raise_two(boxes, min(self.several, cost))
+            yield from self._raise_one(min(self.several, self.two, cost))
+
+    def _raise_one(self, most: float) -> Iterator[None]:
+        """Raise the bound of plans of one run up to so much [s]."""
+        begin = self._scene.time.begin
+        for side in np.argsort(self._runs):
+            if begin + self._runs[side] >= most:
+                break
+            least = float(self._runs[side])
+            for bound in least_single_run(
+                self._scene, self.ends, self._start, self._goal, int(side), most - begin
+            ):
+                self._runs[side] = max(least, bound)
+                self.one = max(self.one, begin + float(self._runs.min()))
+                yield
+
+    def _raise_two(self, boxes: int, most: float) -> Iterator[None]:
+        """Raise the bound of plans of two runs up to so much [s]."""
         reach = 0.5 * self._speed * (most - self._fixed)  # the ellipse of the centre is within it
-        if self.value >= most or reach <= 0.0:
-            self.value = min(self.value, most)
+        if self.two >= most or reach <= 0.0:
             return
         # As much of the bound is lost by the width of a box as by its headings.
         count = max(1, math.ceil(math.pi * 2.0 * self._turning / (reach * math.sqrt(2.0))))
@@ -278,12 +219,12 @@ class CostBound:
         queue: list[tuple[float, int, tuple[float, ...]]] = []
         made = self._add(queue, np.array(roots), 0, most)
         while queue and queue[0][0] < (1.0 - _WORTH) * most and boxes > 0:
-            self.value = max(self.value, queue[0][0])
+            self.two = max(self.two, queue[0][0])
             taken = [heapq.heappop(queue)[2] for _ in range(min(_BATCH, len(queue)))]
             boxes -= len(taken)
             made = self._add(queue, _divided(np.array(taken)), made, most)
             yield
-        self.value = max(self.value, min(queue[0][0] if queue else math.inf, most))
+        self.two = max(self.two, min(queue[0][0] if queue else math.inf, most))
 
     def of_boxes(self, boxes: Array) -> Array:
         """Bounds ``(n,)`` [s] of plans of two runs that change the side in a box ``(n, 5)``: x, y
@@ -303,7 +244,7 @@ class CostBound:
         for bound, box in zip(bounds.tolist(), boxes.tolist(), strict=True):
             if bound < most:
                 made += 1
-                heapq.heappush(queue, (max(bound, self.value), made, tuple(box)))
+                heapq.heappush(queue, (max(bound, self.two), made, tuple(box)))
         return made
 
 

@@ -2,8 +2,9 @@
 
 The thesis adds lengths: of the pushes, and between the robot's places before and after a change of
 the side. Here each push takes the time for its curve at the greatest speed that wheels and settings
-allow, and the time to speed up and to brake. A change of the side takes the time of the robot's
-drive around the object in free space, and that of backing off and approaching.
+allow. Pushes in a row on the same side are one run, in which the robot does not stop: a run takes
+the time to speed up and to brake once. A change of the side takes the time of the robot's drive
+around the object in free space, and that of backing off and approaching.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,9 +30,9 @@ _CELL = 0.02  # [m] of the empty map on which it does
 class PlanTime:
     """Times of pushes and of changes of the side.
 
-    pace: [s/m] of a straight push at full speed; no push takes less. begin: [s] that each push
+    pace: [s/m] of a straight push at full speed; no push takes less. begin: [s] that each run
     takes longer because it begins and ends at rest. changes: ``(sides, sides)`` [s], 0 on the
-    diagonal.
+    diagonal. speeds: pace, half the track [m], greatest speed of a wheel [m/s].
     """
 
     def __init__(
@@ -44,10 +45,14 @@ class PlanTime:
         """outline: ``(n, 2)`` [m] of the object. behind: ``(3,)`` pose of the robot, behind each
         side and clear of it, in the frame of the outline, by the index of the side."""
         drive = robot.differential
-        self._top, self._half = (1.0 - settings.wheel_reserve) * drive.max_speed, drive.half_track
+        self._top, self._half = (
+            (1.0 - settings.wheel_reserve) * drive.max_speed,
+            drive.half_track,
+        )
         self._speed, self._contact_time = settings.push_speed, settings.contact_time
         speed = min(self._speed, self._top)
         self.pace, self.begin = 1.0 / speed, speed / settings.push_acceleration
+        self.speeds = self.pace, self._half, self._top
         corners = tuple((float(x), float(y)) for x, y in outline)
         poses = tuple((float(x), float(y), float(t)) for x, y, t in behind.values())
         self._numbers = {index: number for number, index in enumerate(behind)}
@@ -55,12 +60,12 @@ class PlanTime:
         self.changes = drives + settings.contact_time * (1.0 - np.eye(len(poses)))
 
     def of_push(self, curve: PushCurve) -> float:
-        """[s] of a push along a curve."""
+        """[s] of a push along a curve, at full speed from end to end."""
         points, _, curvature = curve.sample(_SAMPLES)
         pace = np.maximum(1.0 / self._speed, (1.0 + self._half * np.abs(curvature)) / self._top)
         parts = np.hypot(*np.diff(points, axis=0).T)
         mean = float(parts @ (0.5 * (pace[1:] + pace[:-1])) / parts.sum())
-        return self.begin + curve.length * mean
+        return curve.length * mean
 
     def of_plan(self, segments: Sequence[PushSegment], change_weight: float = 1.0) -> float:
         """[s] of pushes one after another: the cost of a plan.
@@ -68,14 +73,19 @@ class PlanTime:
         change_weight: fraction of the time of a change of the side that counts.
         """
         total = 0.0
+        before: PushSegment | None = None
         for s in segments:
-            curve = PushCurve(s.robot_start, s.robot_end, s.k_start, s.k_end, s.length)
-            total += float(s.trajectory.time[-1]) if s.turns else self.of_push(curve)
-        for before, after in zip(segments, segments[1:], strict=False):
-            numbers = self._numbers[before.side], self._numbers[after.side]
-            change = float(self.changes[numbers])
-            # After a push on a corner the robot backs off, also if it goes on on the same side.
-            total += change_weight * max(change, before.turns * self._contact_time)
+            goes_on = before is not None and s.side == before.side and not (s.turns or before.turns)
+            if s.turns:
+                total += float(s.trajectory.time[-1])
+            else:
+                curve = PushCurve(s.robot_start, s.robot_end, s.k_start, s.k_end, s.length)
+                total += self.of_push(curve) + self.begin * (not goes_on)
+            if before is not None:
+                change = float(self.changes[self._numbers[before.side], self._numbers[s.side]])
+                # After a push on a corner the robot backs off, also if it goes on on the same side.
+                total += change_weight * max(change, before.turns * self._contact_time)
+            before = s
         return total
 
 

@@ -12,6 +12,7 @@ from push_model.occupancy import OccupancyGrid
 from push_model.push_segment import PushSegment
 from push_model.specs import ObjectSpec, RobotSpec
 from push_model.stick_certificate import ContactBelief
+from push_planner.arc_pushes import pushes_over_arcs
 from push_planner.candidate_poses import along_guide, manoeuvres, nearby, runs, scattered
 from push_planner.cost_bound import CostBound
 from push_planner.gentle import gentler
@@ -183,14 +184,20 @@ class PushPlanner:
     def _improved(
         self, best: PushPlan, ends: _Ends, guides: Guides, work: Work
     ) -> Generator[Progress, None, PushPlan]:
-        """Search below the cost of the best plan: along another guide path, then near its poses.
-        Returns the best plan."""
+        """Search below the cost of the best plan: along another guide path, over arcs, then near
+        its poses. Returns the best plan."""
         settings = self.settings
         start, goal = (self.scene.item.mass_pose(pose) for pose in ends)
         work.left = settings.improvement_expansions
         for number in range(settings.improvement_rounds):
             bound = (1.0 - _WORTH) * best.cost
-            if work.left <= 0 or bound <= work.least:
+            if bound <= work.least:
+                break
+            if number == 1:
+                best = yield from self._over_arcs(best, ends, work)
+                yield Progress("improving", best)
+                bound = (1.0 - _WORTH) * best.cost
+            if work.left <= 0:
                 break
             if number == 0:
                 count, most = settings.improvement_poses, settings.improvement_expansions // 2
@@ -216,6 +223,22 @@ class PushPlanner:
                 best = found
                 yield Progress("improving", best)
         return best
+
+    def _over_arcs(
+        self, best: PushPlan, ends: _Ends, work: Work
+    ) -> Generator[Progress, None, PushPlan]:
+        """Search over arcs below the cost of the best plan. Returns the best plan."""
+        scene, bound = self.scene, (1.0 - _WORTH) * best.cost
+        start, goal = (scene.item.mass_pose(pose) for pose in ends)
+        nodes, statistics = self.settings.arc_nodes, work.statistics
+        search = pushes_over_arcs(scene, start, goal, bound, work.robot, nodes, statistics)
+        while True:
+            try:
+                next(search)
+            except StopIteration as end:
+                found = end.value and self._assemble(end.value, ends[1], best.guide, work)
+                return best if found is None else found
+            yield Progress("search over arcs", best)
 
     def _eased(self, best: PushPlan, work: Work) -> PushPlan:
         """The best plan with wider bends, or itself."""

@@ -30,7 +30,7 @@ def basis_rows(n: int) -> Array:
     return np.ascontiguousarray(np.array([3 * s**2 - 3 * f1, f1, g1, 6 * s - 3 * f2, f2, g2]).T)
 
 
-_BASIS_COARSE, _BASIS_DENSE = basis_rows(_COARSE), basis_rows(_DENSE)
+BASIS_COARSE, BASIS_DENSE = basis_rows(_COARSE), basis_rows(_DENSE)
 
 
 @numba.njit(cache=True, fastmath=True)
@@ -151,7 +151,7 @@ def _lowest_minimum(values: Any) -> tuple[int, int]:
 
 
 @numba.njit(cache=True, fastmath=True)
-def _solve(
+def solve_curve(
     x: float, y: float, c: float, s: float, low: float, high: float, coarse: Any, dense: Any
 ) -> tuple[float, float, float, bool]:
     """k_i, k_f, length and whether the curve is feasible; start at the origin, heading 0."""
@@ -289,14 +289,14 @@ def shortest_push_curve(
     c, s = math.cos(start[2]), math.sin(start[2])
     dx, dy = end[0] - start[0], end[1] - start[1]
     turn = end[2] - start[2]
-    ki, kf, length, feasible = _solve(
+    ki, kf, length, feasible = solve_curve(
         c * dx + s * dy,
         -s * dx + c * dy,
         math.cos(turn),
         math.sin(turn),
         curvature_min,
         curvature_max,
-        _BASIS_COARSE,
-        _BASIS_DENSE,
+        BASIS_COARSE,
+        BASIS_DENSE,
     )
     return PushCurve(start, end, ki, kf, length) if feasible else None

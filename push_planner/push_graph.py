@@ -40,7 +40,8 @@ class PushStep:
 
     side: the pushed side. curve: path of the robot's axle midpoint. object_start, object_end:
     ``(3,)`` [m, m, rad] poses of the object's centre of mass, world frame. clearance: [m] of robot
-    and object to obstacles along the push. time: [s] that it takes, see ``plan_time.py``.
+    and object to obstacles along the push. time: [s] that it takes at full speed, see
+    ``plan_time.py``.
     """
 
     side: PushSide
@@ -117,8 +118,12 @@ class PushGraph:
         settings, time = scene.settings, scene.time
         widest = int((self.window[:, 1] - self.window[:, 0]).max())
         self._sight = np.zeros((*self.room.shape, widest), dtype=np.int8)
+        # After a change the robot speeds up anew.
         self._changes = change_weight * time.changes
-        self._costs = (time.pace, time.begin, self._changes)
+        self._changes += time.begin * (1.0 - np.eye(len(self._changes)))
+        self.begin = time.begin
+        """[s] that the first push takes longer, because the robot speeds up and brakes."""
+        self._pace = time.pace
         keeps = np.array([self.leaving, settings.safety_distance])
         least = scene.shape.inradius + np.minimum(keeps, settings.safety_distance)
         self._view = (self.window, self._sight, least, scene.field.values, *scene.field.args)
@@ -136,7 +141,9 @@ class PushGraph:
             self.room,
             self.chords,
             self.grasps,
-            *self._costs,
+            self._pace,
+            self.begin,
+            self._changes,
             bound,
             *self._view,
         )
@@ -184,14 +191,16 @@ class PushGraph:
             self.room,
             self.chords,
             self.grasps,
-            *self._costs,
+            self._pace,
+            self._changes,
             bound,
             *self._view,
             ready,
         )
 
     def side_change(self, pose: int, before: int, after: int) -> float:
-        """Cost [s] of changing from one side to another at a pose; 0 if the side is the same.
+        """Cost [s] of changing from one side to another at a pose, and of speeding up again; 0 if
+        the side is the same.
 
         before, after: numbers of the sides; -1 for ``after`` if no push follows.
         """

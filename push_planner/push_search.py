@@ -39,7 +39,7 @@ class SearchNode:
 
     pose: int
     side: int  # on which the push that starts here pushes; -1 at the goal
-    cost: float  # g of (2.10)
+    cost: float  # g of (2.10), but for the robot's speeding up at the start
     parent: "SearchNode | None" = None
     step: PushStep | None = None
     estimates: Array | None = None  # of the pushes that end here
@@ -85,7 +85,7 @@ class PushSearch:
             if node is None:
                 return
             if _passable(graph, node):
-                self.solution, self.cost = trace(node), node.cost
+                self.solution, self.cost = trace(node), graph.begin + node.cost
                 return
 
     def _cheapest(
@@ -146,8 +146,8 @@ class PushSearch:
         for side in range(len(graph.scene.sides)):
             if graph.worth_leaving_for(side, len(graph.poses) - 1) and graph.may_begin(side):
                 step = graph.push(0, len(graph.poses) - 1, side, statistics)
-                if step is not None and step.time < self.bound:
-                    self.solution, self.cost, self.bound = (step,), step.time, step.time
+                if step is not None and (cost := graph.begin + step.time) < self.bound:
+                    self.solution, self.cost, self.bound = (step,), cost, cost
 
 
 def _passable(graph: PushGraph, node: SearchNode) -> bool:

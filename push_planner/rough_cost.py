@@ -185,7 +185,7 @@ def rough_costs(
     room: ``(sides, n)`` whether the robot can reach this contact.
     chords: ``(sides, k, k)`` [m] tables of minimum chord lengths.
     grasps: ``(sides, 3)`` poses of the object in the robot frame.
-    pace: [s/m] of a push. begin: [s] that each push takes longer.
+    pace: [s/m] of a push. begin: [s] that the first push takes longer.
     changes: ``(sides, sides)`` [s] of a change from one side to another, 0 on the diagonal.
     bound: [s] states are left out if their estimate plus their distance to the goal exceeds it.
     window: ``(n, 2)`` for each pose, the range of poses (first, one past the last) to which it may
@@ -209,8 +209,8 @@ def rough_costs(
     queue = [(0.0, -1)]
     for s in range(sides):
         if room[s, 0]:
-            ready[0, s] = 0.0
-            heapq.heappush(queue, (0.0, s))
+            ready[0, s] = begin
+            heapq.heappush(queue, (begin, s))
     while len(queue) > 0:
         cost, state = heapq.heappop(queue)
         if state < 0:
@@ -223,13 +223,12 @@ def rough_costs(
                 continue
             dx, dy = robots[s, j, 0] - robots[s, i, 0], robots[s, j, 1] - robots[s, i, 1]
             straight = math.sqrt(dx * dx + dy * dy)
-            before = cost + begin
-            if before + pace * straight >= min(arrived[j, s], bound - pace * remaining[j]):
+            if cost + pace * straight >= min(arrived[j, s], bound - pace * remaining[j]):
                 continue
             length = _guess(
                 i, j, s, robots, chords, grasps, window, sight, least, field, ox, oy, scale
             )
-            after = before + pace * length
+            after = cost + pace * length
             if after >= arrived[j, s]:
                 continue
             arrived[j, s] = after
@@ -256,7 +255,6 @@ def pushes_into(
     chords: Any,
     grasps: Any,
     pace: float,
-    begin: float,
     changes: Any,
     bound: float,
     window: Any,
@@ -293,7 +291,7 @@ def pushes_into(
     for s in range(sides):
         if not room[s, j]:
             continue
-        before = cost + begin
+        before = cost
         if following >= 0:
             before += changes[s, following]
         for i in range(window[j, 0], min(window[j, 1], n - 1)):

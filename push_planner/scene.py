@@ -32,11 +32,12 @@ from push_planner.push_sweep import SWEEP_LOSS, push_clearance, rooms_behind
 from push_planner.settings import PlannerSettings
 
 _OUTLINE_SPACING = 0.01  # [m] of points between which distances are interpolated
-_LEAVING = 0.15  # [m] of the first push, in which it may be nearer to obstacles than later
+LEAVING = 0.15  # [m] of the first push, in which it may be nearer to obstacles than later
 _LEAST = 0.003  # [m] that the robot keeps even then
 _APART = 0.005  # [m] between poses of the robot that are looked at by themselves
 _CLOSE = 0.5  # of the stand-off, where there is no room for all of it
-_TURNING = 0.25  # of the safety distance that it keeps where it turns, before a push
+TURNING = 0.25
+"""Of the safety distance that the robot keeps where it turns, before a push."""
 
 
 @dataclass(frozen=True)
@@ -161,6 +162,14 @@ class PushScene:
         return self.field.clearances(self._object_points, poses)
 
     @property
+    def bodies(self) -> tuple[Array, Array, float, float, Array]:
+        """Outlines ``(n, 2)`` [m] of object and robot, their radii [m], and for each side how far
+        the robot backs off from it at least [m]."""
+        backs = np.array([self.backs(side)[1] for side in self.sides])
+        points = self._object_points, self._robot_points
+        return *points, self.shape.circumradius, self._robot_radius, backs
+
+    @property
     def sweep_arguments(self) -> tuple[Any, ...]:
         """What ``push_clearance`` takes after the grasp."""
         return (
@@ -210,8 +219,8 @@ class PushScene:
             clearance = self.curve_clearance(curve, side, needed)
             return None if clearance < needed else clearance
         first, rest = curve, None
-        if curve.length > _LEAVING:
-            first, rest = curve.split(_LEAVING)
+        if curve.length > LEAVING:
+            first, rest = curve.split(LEAVING)
         clearance = self.curve_clearance(first, side, leaving)
         if clearance < leaving or self._robot_along(first) < self.robot_keeps(leaving):
             return None
@@ -264,7 +273,7 @@ class PushScene:
         result: NDArray[np.bool_] = rooms_behind(
             contact_poses,
             back,
-            self.robot.footprint_radius + _TURNING * self.settings.safety_distance,
+            self.robot.footprint_radius + TURNING * self.settings.safety_distance,
             keeps,
             self.field.values,
             self._robot_points,

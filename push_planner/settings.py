@@ -96,6 +96,13 @@ class PlannerSettings:
         high=100000,
         doc="Number of random object poses that the first search after the first plan adds",
     )
+    arc_nodes: int = bounded(
+        150000,
+        low=100,
+        high=15000000,
+        doc="Maximum number of object poses in the search over arcs, which looks for a cheaper "
+        "plan than the first one",
+    )
     refinement: float = bounded(
         0.15,
         low=0.001,

@@ -18,6 +18,7 @@ from push_planner import (
     shortest_push_curve,
 )
 from push_planner.guide_path import guide_paths, path_cost, shortest_path
+from push_planner.push_reference import joined
 from push_planner.rough_cost import guessed_length
 from push_planner.shortest_chord import chord, shortest_chords
 from push_scenario.scenario import load_scenario, scenario_names
@@ -70,7 +71,7 @@ def test_plan_is_continuous_stable_and_free(plan, planner, scenario, box):
 def test_pushes_are_as_fast_as_wheels_and_settings_allow(plan, planner, robot):
     """Bends take the wheels to what their reserve leaves, and nothing exceeds push_speed."""
     settings, drive = planner.settings, robot.drive
-    (segment,) = plan.segments
+    (segment,) = joined(plan.segments, drive, settings)
     assert segment.length / segment.trajectory.duration > 0.9 * settings.push_speed
     v, omega = segment.trajectory.twist.T
     wheel = np.abs(v) + drive.half_track * np.abs(omega)
@@ -80,7 +81,8 @@ def test_pushes_are_as_fast_as_wheels_and_settings_allow(plan, planner, robot):
     assert np.abs(rate).max() <= 1.1 * settings.push_acceleration
     hasty = replace(settings, push_speed=2.0, easing=0.0)  # with tight bends
     fast = PushPlanner(hasty, planner.scene.field, robot, planner.scene.item)
-    v, omega = fast.solve(START, GOAL).segments[0].trajectory.twist.T
+    push, *_ = joined(fast.solve(START, GOAL).segments, drive, hasty)
+    v, omega = push.trajectory.twist.T
     wheel = np.abs(v) + drive.half_track * np.abs(omega)
     assert np.sort(wheel)[len(wheel) // 2] == pytest.approx(reserved)
     assert v[np.abs(omega) > 1.0 * v].max() < v.max(), "slower where it turns"

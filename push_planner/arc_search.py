@@ -1,0 +1,396 @@
+"""A* over arcs of stable curvature: object poses through which a cheap plan may lead.
+
+The searches of ``push_search.py`` join poses that are drawn beforehand. Here the poses arise from
+one another: from each one the robot drives short arcs of a few curvatures, or changes the side. Of
+all nodes in a cell of positions and headings, on the same side, only the cheapest one is kept
+(hybrid A*: Dolgov, Thrun, Montemerlo, Diebel, "Path planning for autonomous vehicles in unknown
+semi-structured environments", 2010). The last piece, into the goal, is a push curve. The estimate
+of the rest is a lower bound: that of one run on this side, or that of a change of the side and of
+the way of the object's centre of mass. The search may also run backward from the goal.
+
+Collisions are looked for at the end of each arc only. ``arc_pushes.py`` makes push curves of the
+result, which are checked all along.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from push_model import heap
+from push_model.arrays import Array
+from push_planner.least_way import way_at
+from push_planner.push_curve import BASIS_COARSE, BASIS_DENSE, solve_curve
+from push_planner.push_sweep import push_clearance, rooms_behind
+from push_planner.rough_cost import guessed_length
+from push_planner.run_bounds import run_length, run_time, stands, wrapped
+from push_planner.run_ends import RunEnds
+from push_planner.scene import LEAVING, TURNING, PushScene
+from push_planner.shortest_chord import shortest_chords
+
+_WIDTH, _ANGLES = 0.03, 96  # [m] of a cell, at least; cells in a turn
+_MOST = 4_000_000  # cells: on a large map they are wider
+_STEP = 1.5  # widths of a cell that an arc is long
+_BENDS = np.array([-0.99, -0.5, 0.0, 0.5, 0.99])  # of the trusted curvatures
+_NEAR, _FAR = (
+    0.6,
+    4,
+)  # [m] from which each node is joined to the target; from farther off, each n-th
+_BEND_COST = 1.03  # of the time that a push straight on takes: guess for the last one
+_SLICE = 4000  # nodes between two reports
+
+
+class _Target(NamedTuple):
+    """The other end of the search: ``(sides, 3)`` poses of the robot in contact there, ``(sides,)``
+    whether it has room, what bounds runs and ways to there (``RunEnds``), and 1 forward, -1
+    backward."""
+
+    robots: Any
+    reached: Any
+    radii: Any
+    fastest: Any
+    ways: Any
+    places: Any
+    direction: float
+
+
+class _Sides(NamedTuple):
+    """``(sides, 3)`` poses of the object in the robot frame and of the robot in the object frame,
+    ``(sides, 2)`` [1/m] trusted curvatures, and tables of shortest chords."""
+
+    grasps: Any
+    contacts: Any
+    limits: Any
+    chords: Any
+
+
+class _Costs(NamedTuple):
+    """speeds: see ``run_time``. begin: [s] of each run. changes: ``(sides, sides)`` [s]. least: [s]
+    of them."""
+
+    speeds: Any
+    begin: float
+    changes: Any
+    least: float
+
+
+class _Room(NamedTuple):
+    """Outlines [m], radii [m], and ``(sides,)`` [m] from contact to where the robot may turn;
+    turning, keeps: [m] clearances there and on the way back. needed: [m] clearance of all poses,
+    leaving: [m] that of the first ones, up to ``first`` [s] of cost. map: distance field."""
+
+    object_points: Any
+    robot_points: Any
+    object_radius: float
+    robot_radius: float
+    backs: Any
+    turning: float
+    keeps: float
+    needed: float
+    leaving: float
+    first: float
+    map: Any
+
+
+class _Tree(NamedTuple):
+    """poses ``(n, 3)``, costs ``(n,)`` [s], parents ``(n,)``, sides ``(n,)`` of the nodes; a heap
+    of them; ``(rows, columns, angles, sides)`` least costs of cells; x, y [m] of the first cell,
+    width [m] of a cell. counts: nodes, size of the heap, expanded ones. best: cost [s] and last
+    node of the best plan."""
+
+    poses: Any
+    costs: Any
+    parents: Any
+    sides: Any
+    keys: Any
+    items: Any
+    cells: Any
+    x: float
+    y: float
+    width: float
+    counts: Any
+    best: Any
+
+
+@numba.njit(cache=True)
+def _composed(pose: Any, x: float, y: float, angle: float) -> Any:
+    """``(3,)`` the pose (x, y, angle) of the frame at a pose."""
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    result = np.empty(3)
+    result[0], result[1] = pose[0] + c * x - s * y, pose[1] + s * x + c * y
+    result[2] = pose[2] + angle
+    return result
+
+
+@numba.njit(cache=True)
+def _placed(pose: Any, offsets: Any, side: int) -> Any:
+    """``(3,)`` the pose that has the offset of a side from a pose."""
+    return _composed(pose, offsets[side, 0], offsets[side, 1], offsets[side, 2])
+
+
+@numba.njit(cache=True)
+def _cell(pose: Any, tree: Any) -> tuple[int, int, int]:
+    """Indices of the cell of a pose; the first is -1 outside the map."""
+    rows, columns, angles = tree.cells.shape[:3]
+    i, j = int((pose[1] - tree.y) / tree.width), int((pose[0] - tree.x) / tree.width)
+    if pose[0] < tree.x or pose[1] < tree.y or i >= rows or j >= columns:
+        i = -1
+    return i, j, int(pose[2] % (2.0 * math.pi) / (2.0 * math.pi) * angles) % angles
+
+
+@numba.njit(cache=True)  # infinities: no fast mathematics
+def _rest(pose: Any, robot: Any, side: int, target: Any, costs: Any) -> float:
+    """Estimate [s] from a node to the target, never more than it is."""
+    places = target.places
+    way = way_at(target.ways, pose[0], pose[1], 0.0, places[0], places[1], places[2])
+    other = costs.least + costs.begin + run_time(way / target.fastest.max(), 0.0, costs.speeds)
+    if not target.reached[side]:
+        return float(other)
+    x, y, theta = target.robots[side]
+    if target.direction > 0.0:
+        length = run_length(robot[0], robot[1], robot[2], x, y, theta, target.radii[side], 0.0, 0.0)
+    else:
+        length = run_length(x, y, theta, robot[0], robot[1], robot[2], target.radii[side], 0.0, 0.0)
+    length = max(length, way / target.fastest[side])
+    return float(min(other, run_time(length, abs(wrapped(theta - robot[2])), costs.speeds)))
+
+
+@numba.njit(cache=True)
+def _free(pose: Any, robot: Any, needed: float, room: Any) -> bool:
+    """Whether object and robot keep ``needed`` [m] at a pose."""
+    field, ox, oy, scale = room.map
+    x, y, theta = robot
+    if not stands(room.robot_points, room.robot_radius, x, y, theta, needed, field, ox, oy, scale):
+        return False
+    x, y, theta = pose
+    return bool(
+        stands(room.object_points, room.object_radius, x, y, theta, needed, field, ox, oy, scale)
+    )
+
+
+@numba.njit(cache=True)
+def _may_change(robot: Any, side: int, room: Any) -> bool:
+    """Whether the robot can back off from a contact."""
+    field, ox, oy, scale = room.map
+    found = rooms_behind(
+        robot.reshape((1, 3)), room.backs[side], room.turning, room.keeps,
+        field, room.robot_points, ox, oy, scale,
+    )  # fmt: skip
+    return bool(found[0])
+
+
+@numba.njit(cache=True)  # infinities: no fast mathematics
+def _last_push(
+    robot: Any, side: int, target: Any, sides: Any, room: Any, most: float, near: bool,
+    coarse: Any, dense: Any,
+) -> float:  # fmt: skip
+    """Length [m] of a push curve between a node and the target, infinite without one.
+
+    most: [m] it may be. near: whether only targets that are near count.
+    """
+    field, ox, oy, scale = room.map
+    a, b = robot, target.robots[side]
+    if target.direction < 0.0:
+        a, b = b, a
+    x, y, theta = a
+    c, s = math.cos(theta), math.sin(theta)
+    d, e = math.cos(b[2]), math.sin(b[2])
+    guess = guessed_length(x, y, c, s, b[0], b[1], d, e, sides.chords[side])
+    if guess > most or (near and guess > _NEAR):
+        return math.inf
+    dx, dy, turn = b[0] - x, b[1] - y, b[2] - theta
+    ki, kf, length, found = solve_curve(
+        c * dx + s * dy, -s * dx + c * dy, math.cos(turn), math.sin(turn),
+        sides.limits[side, 0], sides.limits[side, 1], coarse, dense,
+    )  # fmt: skip
+    if not found or length > most:
+        return math.inf
+    clearance = push_clearance(
+        a, b, ki, kf, length, room.needed, sides.grasps[side], field, room.robot_points,
+        room.object_points, room.robot_radius, room.object_radius, ox, oy, scale,
+    )  # fmt: skip
+    return float(length) if clearance >= room.needed else math.inf
+
+
+@numba.njit(cache=True)  # infinities: no fast mathematics
+def _offer(
+    pose: Any, robot: Any, side: int, cost: float, parent: int, needed: float,
+    tree: Any, target: Any, costs: Any, room: Any,
+) -> None:  # fmt: skip
+    """Add a node unless its cell has a cheaper one or something is in its way."""
+    i, j, k = _cell(pose, tree)
+    if i < 0 or cost >= tree.best[0] or tree.cells[i, j, k, side] <= cost:
+        return
+    if not _free(pose, robot, needed, room):
+        return
+    tree.cells[i, j, k, side] = cost
+    n = tree.counts[0]
+    tree.poses[n], tree.costs[n], tree.parents[n], tree.sides[n] = pose, cost, parent, side
+    tree.counts[0] = n + 1
+    key = cost + _rest(pose, robot, side, target, costs)
+    if key < tree.best[0]:
+        tree.counts[1] = heap.push(tree.keys, tree.items, tree.counts[1], key, n)
+
+
+@numba.njit(cache=True)  # infinities: no fast mathematics
+def _advance(
+    budget: int, tree: Any, target: Any, sides: Any, costs: Any, room: Any, bends: Any,
+    coarse: Any, dense: Any,
+) -> bool:  # fmt: skip
+    """Expand so many nodes; True when the search has ended."""
+    step = _STEP * tree.width
+    pace = _BEND_COST * costs.speeds[0]
+    for _ in range(budget):
+        if tree.counts[1] == 0 or tree.counts[0] + len(bends) + len(sides.grasps) > len(tree.costs):
+            return True
+        estimate, n, tree.counts[1] = heap.pop(tree.keys, tree.items, tree.counts[1])
+        if estimate >= tree.best[0]:
+            return True
+        pose, side, cost = tree.poses[n], tree.sides[n], tree.costs[n]
+        i, j, k = _cell(pose, tree)
+        if tree.cells[i, j, k, side] < cost:
+            continue
+        tree.counts[2] += 1
+        robot = _placed(pose, sides.contacts, side)
+        if target.reached[side]:
+            most, near = (tree.best[0] - cost) / pace, tree.counts[2] % _FAR != 0
+            length = _last_push(robot, side, target, sides, room, most, near, coarse, dense)
+            if length < math.inf:
+                tree.best[0], tree.best[1] = cost + pace * length, n
+        low, high = sides.limits[side]
+        for bend in bends:
+            turn = step * target.direction * bend * (high if bend > 0.0 else -low)
+            chord = step * target.direction
+            if turn != 0.0:
+                chord *= math.sin(0.5 * turn) / (0.5 * turn)
+            ahead, aside = chord * math.cos(0.5 * turn), chord * math.sin(0.5 * turn)
+            after = _composed(robot, ahead, aside, turn)
+            total = cost + run_time(step, abs(turn), costs.speeds)
+            needed = room.needed if total > room.first else room.leaving
+            reached = _placed(after, sides.grasps, side)
+            _offer(reached, after, side, total, n, needed, tree, target, costs, room)
+        parent = tree.parents[n]
+        if parent < 0 or tree.sides[parent] != side or not _may_change(robot, side, room):
+            continue
+        for other in range(len(sides.grasps)):
+            total = cost + costs.changes[side, other] + costs.begin
+            if total < tree.best[0]:
+                after = _placed(pose, sides.contacts, other)
+                if _may_change(after, other, room):
+                    _offer(pose, after, other, total, n, room.needed, tree, target, costs, room)
+    return False
+
+
+class ArcSearch:
+    """A search from the start, or backward from the goal. ``run`` does the work in slices.
+
+    cost: [s] about what the plan costs; infinite while none was found. expanded: number of nodes.
+    """
+
+    def __init__(
+        self,
+        scene: PushScene,
+        ends: RunEnds,
+        start: Array,
+        goal: Array,
+        begins: NDArray[np.bool_],
+        backward: bool,
+        bound: float,
+        most: int,
+    ) -> None:
+        """Prepare the search.
+
+        start, goal: ``(3,)`` [m, m, rad] poses of the object's centre of mass. begins: ``(sides,)``
+        whether the robot can come to the side at the start. backward: from the goal to the start.
+        bound: [s] the plan must cost less. most: number of nodes at most.
+        """
+        settings, time, sides = scene.settings, scene.time, scene.sides
+        pose, self._target = (goal, start) if backward else (start, goal)
+        begins, self._backward = ends.leaves & begins, backward
+        known = ends.radii, ends.fastest
+        if backward:
+            gone = ends.gone
+            target = _Target(ends.starts, begins, *known, gone.levels, gone.places, -1.0)
+        else:
+            left = ends.left
+            target = _Target(ends.goals, ends.arrives, *known, left.levels, left.places, 1.0)
+        limits = np.array([[s.trusted.minimum, s.trusted.maximum] for s in sides])
+        chords = np.array([shortest_chords(*limit) for limit in limits])
+        changes = time.changes.copy()
+        np.fill_diagonal(changes, math.inf)
+        needed = settings.safety_distance
+        room = _Room(
+            *scene.bodies,
+            scene.robot.footprint_radius + TURNING * needed,
+            scene.robot_keeps(),
+            needed,
+            needed if backward else scene.leaving(pose),
+            time.begin + run_time(LEAVING, 0.0, time.speeds),
+            (scene.field.values, *scene.field.args),
+        )
+        self._tree = self._planted(scene, pose, ends.arrives if backward else begins, bound, most)
+        self._known = (
+            target,
+            _Sides(np.array([s.grasp for s in sides]), ends.contacts, limits, chords),
+            _Costs(time.speeds, time.begin, changes, float(changes.min())),
+            room,
+            *(_BENDS, BASIS_COARSE, BASIS_DENSE),
+        )
+
+    def _planted(
+        self, scene: PushScene, pose: Array, begins: NDArray[np.bool_], bound: float, most: int
+    ) -> _Tree:
+        """A tree with a node for each side."""
+        x0, x1, y0, y1 = scene.field.grid.extent
+        count = len(scene.sides)
+        width = max(_WIDTH, math.sqrt((x1 - x0) * (y1 - y0) * _ANGLES * count / _MOST))
+        shape = math.ceil((y1 - y0) / width), math.ceil((x1 - x0) / width), _ANGLES, count
+        tree = _Tree(
+            np.empty((most, 3)),
+            np.empty(most),
+            np.full(most, -1, dtype=np.int64),
+            np.empty(most, dtype=np.int64),
+            np.empty(most),
+            np.empty(most, dtype=np.int64),
+            np.full(shape, math.inf),
+            *(x0, y0, width),
+            np.zeros(3, dtype=np.int64),
+            np.array([bound, -1.0]),
+        )
+        for n, side in enumerate(np.flatnonzero(begins)):
+            tree.poses[n], tree.costs[n], tree.sides[n] = pose, scene.time.begin, side
+            tree.counts[:2] = n + 1, heap.push(tree.keys, tree.items, n, 0.0, n)
+        return tree
+
+    @property
+    def cost(self) -> float:
+        """See the class."""
+        return float(self._tree.best[0]) if self._tree.best[1] >= 0.0 else math.inf
+
+    @property
+    def expanded(self) -> int:
+        """See the class."""
+        return int(self._tree.counts[2])
+
+    def run(self) -> Iterator[None]:
+        """Search; yields after each slice."""
+        while not _advance(_SLICE, self._tree, *self._known):
+            yield
+
+    def path(self) -> tuple[Array, NDArray[np.int64]]:
+        """``(n, 3)`` poses of the object from the start to the goal, and ``(n - 1,)`` numbers of
+        the sides on which it is pushed between them."""
+        tree, n = self._tree, int(self._tree.best[1])
+        found, on = [self._target, tree.poses[n]], [int(tree.sides[n])]
+        while tree.parents[n] >= 0:
+            before = int(tree.parents[n])
+            if tree.sides[before] == tree.sides[n]:
+                found.append(tree.poses[before])
+                on.append(int(tree.sides[n]))
+            n = before
+        if self._backward:
+            return np.array(found), np.array(on)
+        return np.array(found[::-1]), np.array(on[::-1])
