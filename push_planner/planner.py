@@ -35,6 +35,7 @@ from push_planner.work import Guides, Work
 
 _Ends = tuple[Array, Array]
 _WORTH = 0.002  # of the cost that a further plan must save
+_NEAR_BOUND = 0.05  # of the lower bound: a plan so near to it needs no search over arcs
 _NEARBY = 40  # poses about each one that an improvement moves
 _SIZES = 9  # rounds after which an improvement moves poses by the first size again
 _WAYPOINTS = 30  # at most, in the first attempt
@@ -125,14 +126,17 @@ class PushPlanner:
                 yield progress
             if best is None:
                 raise self._refusal(ends, guides.all(), work)
-            best = yield from self._improved(best, ends, guides, work)
         for _ in bound.run(settings.bound_boxes if thorough else 0, best.cost):
             yield Progress("lower bound of the cost", best)
+        work.least = bound.value
+        if settings.planner == "lazy":
+            best = yield from self._improved(best, ends, guides, work)
         if settings.planner == "lazy" and settings.easing > 0.0:
             yield Progress("wider bends", best)
             best = self._eased(best, work)
         statistics = work.counted(best.guide)
-        yield Progress("done", replace(best, cost_bound=bound.value, statistics=statistics))
+        least = min(bound.value, best.cost)
+        yield Progress("done", replace(best, cost_bound=least, statistics=statistics))
 
     def _first_plan(
         self, ends: _Ends, guides: Guides, work: Work, thorough: bool
@@ -193,7 +197,7 @@ class PushPlanner:
             bound = (1.0 - _WORTH) * best.cost
             if bound <= work.least:
                 break
-            if number == 1:
+            if number == 1 and best.cost > (1.0 + _NEAR_BOUND) * work.least:
                 best = yield from self._over_arcs(best, ends, work)
                 yield Progress("improving", best)
                 bound = (1.0 - _WORTH) * best.cost
