@@ -83,7 +83,8 @@ def _methods() -> None:
     warm_up(group.object()[1], group.robot()[1])
     for method, name in ((GROUP, "group-ellipse"), (SWARM, "swarm-square"), (SWARM, "swarm-walls")):
         _begin(method, load_scenario(name))
-    _begin(OWN_SENSING, load_scenario("own-sensing"), turned=False)
+    for name in ("own-sensing", "swarm-walls"):
+        _begin(OWN_SENSING, load_scenario(name), turned=False)
 
 
 def _begin(method: "MethodSpec", scenario: "Scenario", turned: bool = True) -> None:

@@ -1,13 +1,15 @@
 """Hosts a law that gives robots velocities: one position after another, in an open room.
 
 The rivals of the studies and the swarm with own sensing are such laws. Each is a file that says how
-robots move; the rest is the same for all.
+robots move; the rest is the same for all. A law that leads the object round walls says how long the
+way is that is left (``WalledLaw``), because the object may have to go away from its target first.
 """
 
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from itertools import pairwise
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -43,7 +45,8 @@ class OpenRoomSettings:
         120.0,
         low=1.0,
         high=3600.0,
-        doc="Time after which the job fails if the object has come no closer to its target (s).",
+        doc="Time after which the job fails if the object has come no closer to its target (s). In "
+        "a room with walls in it, the length of its way round them counts",
     )
     seed: int = bounded(0, low=0, high=2**31 - 1, doc="Seed of the random numbers of this method.")
 
@@ -73,11 +76,37 @@ class VelocityLaw(Protocol):
         ...
 
 
+@runtime_checkable
+class WalledLaw(Protocol):
+    """A law for rooms with walls in them."""
+
+    def left(self, pose: Array) -> float:
+        """[m] of way that an object with its centre of mass at ``(3,)`` has to its target; inf if
+        it is not known yet."""
+        ...
+
+
+class NoWay(Exception):
+    """Raised by a law: walls separate the object from its target."""
+
+
+Ways = Callable[[ObjectSpec, Array, Array], None]
+"""Raises NoWay if an object cannot go from one point ``(2,)`` [m] to another one, as of
+``OpenRoom``."""
+
+
 class OpenRoomMethod:
     """A method whose robots move as a law says."""
 
-    def __init__(self, name: str, make: Callable[[OpenRoom], VelocityLaw], arena: Arena) -> None:
-        self._name, self._make, self._arena = name, make, arena
+    def __init__(
+        self,
+        name: str,
+        make: Callable[[OpenRoom], VelocityLaw],
+        arena: Arena,
+        ways: Ways | None = None,
+    ) -> None:
+        """ways: where the room has walls in it."""
+        self._name, self._make, self._arena, self._ways = name, make, arena, ways
         self._settings = arena.section("", OpenRoomSettings)
         self._law: VelocityLaw | None = None
         self._targets: tuple[Array, ...] = ()
@@ -109,6 +138,14 @@ class OpenRoomMethod:
         if task.times or not all(math.isnan(t[2]) for t in task.targets):
             text = f"the method '{self._name}' takes positions, without headings or times"
             return Refusal(JobError.INVALID_GOAL, text)
+        if self._ways is not None and seen is not None:
+            item = belief.object(self._arena.object)
+            places = [item.mass_pose(seen.object)[:2], *(t[:2] for t in task.targets)]
+            try:
+                for start, end in pairwise(places):
+                    self._ways(item, start - self._middle, end - self._middle)
+            except NoWay as problem:
+                return Refusal(JobError.PLANNING_FAILED, str(problem))
         return Certificate()
 
     def begin(self, task: Task, belief: Belief) -> None:
@@ -145,7 +182,10 @@ class OpenRoomMethod:
                 self.end(JobError.NONE, f"at the goal: {1e3 * away:.0f} mm")
                 return Told()
             self._aim(belief)
-        if not self._progresses(seen.time, away):
+        origin = np.array([*self._middle, 0.0])
+        pose = self._item.mass_pose(seen.object) - origin
+        left = self._law.left(pose) if isinstance(self._law, WalledLaw) else away
+        if not self._progresses(seen.time, left):
             text = f"the object has not come closer for {self._settings.stalled:g} s"
             self.end(JobError.EXECUTION_FAILED, text)
         if not names or self._law is None:
@@ -154,9 +194,11 @@ class OpenRoomMethod:
         waits = 1e-9 < self._next - seen.time < _STEP + 1e-9  # else time has jumped back
         if not waits or names != self._names:
             self._next, self._names = seen.time + _STEP, names
-            origin = np.array([*self._middle, 0.0])
-            pose = self._item.mass_pose(seen.object) - origin
-            chosen = self._law.velocities(seen.time, pose, robots - origin)
+            try:
+                chosen = self._law.velocities(seen.time, pose, robots - origin)
+            except NoWay as problem:
+                self.end(JobError.PLANNING_FAILED, str(problem))
+                return Told()
             fast = np.hypot(*chosen.T) / robot.max_speed
             self._held = chosen / np.maximum(fast, 1.0)[:, None]
         told = self._held
@@ -164,9 +206,9 @@ class OpenRoomMethod:
             told = robot.kinematics.follow(told, robots[:, 2], _LEAD)
         return Told({n: (float(a), float(b)) for n, (a, b) in zip(names, told, strict=True)})
 
-    def _progresses(self, now: float, away: float) -> bool:
-        if math.isnan(self._closer) or away < self._nearest - _CLOSER:
-            self._nearest, self._closer = away, now
+    def _progresses(self, now: float, left: float) -> bool:
+        if math.isnan(self._closer) or left < self._nearest - _CLOSER:
+            self._nearest, self._closer = left, now
         limit: float = self._settings.stalled
         return now - self._closer <= limit
 

@@ -1,9 +1,10 @@
 """The law of one robot that has only its own sensing: what it sees in, its velocity out.
 
-The robot estimates the centre c of the object from the outermost points that it sees (``_middle``).
-From there u points to the target. Where u points into the object at the place of the object that is
-nearest to the robot, the robot pushes: it moves along u, and evenly apart from its neighbours at
-the object. Elsewhere it goes round the object to its back, the shorter way.
+The robot estimates the centre c of the object from the outermost points that it sees
+(``seen_centre``). From there u points to the target, or to the point that a guide gives instead
+(``map_guide.py``). Where u points into the object at the place of the object that is nearest to the
+robot, the robot pushes: it moves along u, and evenly apart from its neighbours at the object.
+Elsewhere it goes round the object to its back, the shorter way.
 
 Two terms keep the object on course. A robot whose push is not square to the side that it pushes
 turns the object, until it is; and a robot whose side makes the object drift off the line to the
@@ -12,7 +13,7 @@ target slows down, until robots at another side make up for it. Near the target 
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Protocol
 
 import numba
 import numpy as np
@@ -94,6 +95,13 @@ class LocalLawSettings:
         doc="Angular velocity at which a robot turns the object, divided by the sine of the angle "
         "between the push direction and the inward normal of the outline (rad/s)",
     )
+    walled_turn: float = bounded(
+        0.6,
+        low=0.0,
+        high=10.0,
+        doc="The same as 'turn', on a map with walls, where an object that turns too slowly gets "
+        "to a wall beside its route (rad/s)",
+    )
     drift: float = bounded(
         4.0,
         low=0.0,
@@ -132,13 +140,47 @@ class LocalLawSettings:
     )
 
 
+class Guide(Protocol):
+    """Takes the place of the beacon; all points are in the robot's frame."""
+
+    def look(self, reading: Reading) -> None:
+        """Once for every reading, before the others."""
+        ...
+
+    def target(self, centre: Array) -> Array:
+        """``(2,)`` [m] to which the object with its centre at ``(2,)`` [m] is to be pushed."""
+        ...
+
+    def pins(self, inward: Array) -> bool:
+        """Whether a push along ``inward (2,)`` presses the object against a wall that is near."""
+        ...
+
+    def blocked(self, centre: Array, turn: float) -> bool:
+        """Whether walls leave the robot no room on its way round the object with its centre at
+        ``(2,)`` [m], by an angle of ``turn`` [rad], counterclockwise."""
+        ...
+
+    def walk(self) -> Array:
+        """``(2,)`` [m] to which the robot is to walk if it does not see the object."""
+        ...
+
+
 class LocalLaw:
     """One robot of a radius [m] and a greatest speed [m/s], and what it remembers."""
 
     def __init__(
-        self, radius: float, speed: float, settings: LocalLawSettings, seed: Sequence[int] = (0,)
+        self,
+        radius: float,
+        speed: float,
+        settings: LocalLawSettings,
+        seed: Sequence[int] = (0,),
+        guide: Guide | None = None,
+        discs: tuple[float, float] | None = None,
     ) -> None:
-        """seed: of the directions in which it looks for the object."""
+        """seed: of the directions in which it looks for the object. guide: of a robot with a map;
+        takes the place of the beacon. discs: radii [m] of two discs about the object's centre, if
+        the robot is told them: one lies in the object, the other one contains it."""
+        self._guide, self._discs = guide, discs
         self._random = np.random.default_rng(seed)
         self._lost, self._heading = 0.0, self._random.uniform(-math.pi, math.pi)  # [s], [rad]
         self._radius, self._speed, self.settings = radius, speed, settings
@@ -148,12 +190,15 @@ class LocalLaw:
 
     def step(self, reading: Reading, dt: float) -> Array:
         """Velocity ``(2,)`` [m/s] in the robot's frame. dt: [s] since the reading before."""
+        if self._guide is not None:
+            self._guide.look(reading)
         if len(reading.object) < _SEEN:
             self._centre, self._drifts = None, np.zeros(2)
             return self._search(reading, dt)
         self._lost = 0.0
         centre = self._look(reading, dt)
-        to_target = reading.target - centre
+        target = reading.target if self._guide is None else self._guide.target(centre)
+        to_target = target - centre
         left = math.hypot(*to_target)
         u = to_target / max(left, 1e-9)
         away = np.hypot(*reading.object.T)
@@ -164,7 +209,8 @@ class LocalLaw:
         pace = min(s.speed * top, max(s.least_speed * top, s.slowing * left))
         mates, at, behind = self._mates(reading, u)
         moving = np.where(behind[:, None], pace * u, 0.0)
-        if inward @ u > s.least:
+        pins = self._guide is not None and self._guide.pins(inward)
+        if inward @ u > s.least and not pins:
             v = self._push(gap, inward, centre, u, pace, mates[at] @ _left(u))
         else:
             v = self._go_round(gap, inward, centre, u)
@@ -172,7 +218,9 @@ class LocalLaw:
 
     def _look(self, reading: Reading, dt: float) -> Array:
         """``(2,)`` [m] of the object's centre; keeps half its extent and its velocity."""
-        centre, self._half = _middle(reading.object)
+        centre, self._half = seen_centre(reading.object)
+        if self._discs is not None:
+            centre = _between(centre, reading.object, self._discs)
         back = rotation_matrix(float(reading.moved[2])).T
         self._drifts = back @ self._drifts
         if self._centre is not None and dt > 0.0:
@@ -206,7 +254,8 @@ class LocalLaw:
         into = min(max(s.gain * gap + _PRESS, 0.0), _FASTEST if touches else top)
         v = pace * u + into * inward
         off = float(inward[0] * u[1] - inward[1] * u[0])
-        v = v + s.turn * off * _left(-centre)
+        rate = s.turn if self._guide is None else s.walled_turn
+        v = v + rate * off * _left(-centre)
         along = _left(inward)
         along = along if along @ side > 0.0 else -along
         left = others[others > 0.0]
@@ -224,7 +273,12 @@ class LocalLaw:
         ahead = math.atan2(float(-centre @ _left(u)), float(-centre @ u))
         along = _left(inward)
         # Counterclockwise about the centre for a robot to the left of the line to the target.
-        if float(along @ _left(-centre)) * (1.0 if ahead > 0.0 else -1.0) < 0.0:
+        sign = 1.0 if ahead > 0.0 else -1.0
+        if self._guide is not None:
+            shorter, longer = math.pi * sign - ahead, -math.pi * sign - ahead
+            if self._guide.blocked(centre, shorter) and not self._guide.blocked(centre, longer):
+                sign = -sign
+        if float(along @ _left(-centre)) * sign < 0.0:
             along = -along
         closer = min(max(_KEEPS * (gap - self.settings.clearance), -1.0), 1.0)
         v: Array = self._speed * (along + closer * inward)
@@ -236,7 +290,9 @@ class LocalLaw:
         straight on, in a new direction at each wall and now and then."""
         self._lost += dt
         walls = reading.walls
-        if self._lost > _PATIENCE:
+        if self._guide is not None:
+            way = self._guide.walk()
+        elif self._lost > _PATIENCE:
             self._heading -= float(reading.moved[2])
             way = np.array([math.cos(self._heading), math.sin(self._heading)])
             meets = walls[np.hypot(*walls.T) < _TURNS] @ way > 0.0
@@ -262,7 +318,7 @@ class LocalLaw:
         return kept
 
 
-def _middle(points: Array) -> tuple[Array, float]:
+def seen_centre(points: Array) -> tuple[Array, float]:
     """Centre ``(2,)`` [m] of an object of which points ``(k, 2)`` are seen, and half its extent
     [m]: that of the chord between the outermost points. The centre lies on the middle of the chord
     if the object bulges towards the robot, as a corner of a square does, and behind the chord if
@@ -276,6 +332,21 @@ def _middle(points: Array) -> tuple[Array, float]:
     bulge = float(((one - points) @ behind).max())
     centre: Array = 0.5 * (one + other) + max(_DEEP * half - bulge, 0.0) * behind
     return centre, half
+
+
+def _between(centre: Array, points: Array, discs: tuple[float, float]) -> Array:
+    """A centre ``(2,)`` [m], moved away from the robot or towards it, so that points ``(k, 2)`` of
+    the outline are not inside the inner one of two discs about it, nor outside the outer one.
+    discs: their radii [m]."""
+    inner, outer = discs
+    away = max(math.hypot(*centre), 1e-9)
+    unit = centre / away
+    along, across = points @ unit, np.abs(points @ _left(unit))
+    near, inside = across < inner, across < outer
+    least = (along[near] + np.sqrt(inner**2 - across[near] ** 2)).max(initial=away)
+    most = (along[inside] + np.sqrt(outer**2 - across[inside] ** 2)).min(initial=math.inf)
+    moved: Array = unit * min(float(least), float(most))
+    return moved
 
 
 def _left(v: Array) -> Array:

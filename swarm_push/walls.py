@@ -45,7 +45,7 @@ class Walls:
         here = self._field.lattice(np.array([self.grid.origin]))
         flood = self._flood_from(here[0])
         _are_reached(flood.state, flood.stride, here)
-        _along(self._field.values, flood.state, flood.cost, flood.stride, here, 1.0, 1.0)
+        farthest_seen(self._field.values, flood.state, flood.cost, flood.stride, here, 1.0, 1.0)
         flood.step(1)
         self.into_room(np.array([self.grid.origin]))
 
@@ -114,7 +114,7 @@ class Walls:
             return aims, length
         here = self._field.lattice(robots[hidden])
         ways = self._ways_to(item, here)
-        found, lengths = _along(
+        found, lengths = farthest_seen(
             self._field.values,
             ways.state,
             ways.cost,
@@ -175,7 +175,7 @@ def _are_reached(state: Any, stride: int, here: Any) -> bool:
 
 
 @numba.njit(cache=True)
-def _along(
+def farthest_seen(
     field: Any, state: Any, cost: Any, stride: int, here: Any, radius: float, least: float
 ) -> Any:
     """The farthest point on its path that each robot sees, and the length of the path; infinite

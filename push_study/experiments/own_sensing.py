@@ -1,7 +1,9 @@
 """Robots that have only their own sensing, as range, errors and number of robots change.
 
 Each scenario is one change of the contests ``open-square`` and ``open-triangle`` of the
-leaderboard. Trials alternate between both objects.
+leaderboard. Trials alternate between both objects. The name of a map of ``swarm-maps`` is a
+scenario as well: robots that have this map bring the seven objects of that study round its walls.
+A trial on a map is one of every object.
 """
 
 import math
@@ -13,14 +15,19 @@ import numpy as np
 
 from push_job.method import Task
 from push_model import se2
+from push_model.free_space import FreeSpace
 from push_model.settings import SettingsError
 from push_model.specs import EnvironmentSpec
+from push_scenario.bodies import load_object, load_robot
 from push_scenario.scatter import around
 from push_scenario.scenario import Scenario
 from push_study.leaderboard.contests import SIZE, contest, straight
 from push_study.pool import Row
 from push_study.statistics import wilson
 from push_study.study import StudyOptions
+from push_study.swarm.map_tables import OBJECTS, ROBOTS
+from push_study.swarm.maps import MAPS, REACHED, drawn, load_map
+from push_study.swarm.targets import ROBOT
 from push_study.team_run import made_scenario, run_team
 from push_study.uncertainty import uncertainty
 
@@ -49,13 +56,14 @@ CONDITIONS = {
 SCENARIOS = tuple(CONDITIONS)
 OPTIONS = {"uncertainty": "mild", "world": "planar"}
 CONTESTS = ("open-square", "open-triangle")
-_LIMIT = 300.0  # [s]
+_LIMIT, _MAP_LIMIT = 300.0, 1200.0  # [s]; on a map as in ``swarm-maps``
+_STALLED = 120.0  # [s] on a map
 _SPACE = 0.3  # [m] from the robots to the walls
 
 
 @dataclass(frozen=True)
 class SensingTask:
-    """A run. scenario: of ``CONDITIONS``; contest: of ``CONTESTS``."""
+    """A run. scenario: a condition or a map; contest: of ``CONTESTS``; on a map the object."""
 
     scenario: str
     seed: int
@@ -65,27 +73,29 @@ class SensingTask:
 
 
 def tasks(options: StudyOptions) -> list[SensingTask]:
-    """As many of each condition; raises SettingsError for what is no condition."""
+    """As many of each condition, and with each object of each map; raises SettingsError for what is
+    neither a condition nor a map."""
     for name in options.scenarios:
-        if name not in CONDITIONS:
-            known = ", ".join(CONDITIONS)
-            raise SettingsError(f"no condition called '{name}'; expected one of: {known}")
+        if name not in CONDITIONS and name not in MAPS:
+            known = ", ".join([*CONDITIONS, *MAPS])
+            raise SettingsError(f"no condition or map called '{name}'; expected one of: {known}")
     world = options.world or OPTIONS["world"]
     return [
-        SensingTask(
-            name,
-            options.seed + k,
-            CONTESTS[(options.seed + k) % len(CONTESTS)],
-            world,
-            options.uncertainty,
-        )
+        SensingTask(name, options.seed + k, contest, world, options.uncertainty)
         for k in range(options.trials)
         for name in options.scenarios
+        for contest in _contests(name, options.seed + k)
     ]
 
 
+def _contests(name: str, seed: int) -> tuple[str, ...]:
+    return OBJECTS if name in MAPS else (CONTESTS[seed % len(CONTESTS)],)
+
+
 def scenario_of(task: SensingTask) -> tuple[Scenario, Task, float]:
-    """The run, its task, and how far [m] the object has to go."""
+    """The run, its task, and how far [m] the object has to go: straight, or round the walls."""
+    if task.scenario in MAPS:
+        return _on_map(task)
     condition, problem = CONDITIONS[task.scenario], contest(task.contest).draw(task.seed)
     random = np.random.default_rng([task.seed, condition.robots])
     places = around(random, condition.robots, problem.item, problem.robot.footprint_radius)
@@ -109,12 +119,30 @@ def scenario_of(task: SensingTask) -> tuple[Scenario, Task, float]:
     return scenario, Task((problem.goal,)), straight(problem)
 
 
+def _on_map(task: SensingTask) -> tuple[Scenario, Task, float]:
+    item, robot, room = (
+        load_object(f"transport_{task.contest}"),
+        load_robot(ROBOT),
+        load_map(task.scenario),
+    )
+    start, goal, begin = drawn(task.scenario, item, task.seed, ROBOTS, turned=False)
+    settings = {"position_tolerance": REACHED, "stalled": _STALLED, "seed": task.seed}
+    parameters = {"own-sensing": settings}
+    scenario = made_scenario(task.scenario, room, robot, begin, item, start, parameters)
+    radius = float(np.hypot(*item.geometry.outline.T).max())
+    reach = FreeSpace(scenario.grid).from_here(item.mass_pose(start)[:2], radius)
+    way = reach.way_to(goal[:2])
+    assert way is not None
+    return scenario, Task((goal,)), float(np.hypot(*np.diff(way, axis=0).T).sum())
+
+
 def trial(task: SensingTask) -> Row:
     """To the target, or until the time is over."""
     scenario, goal, way = scenario_of(task)
     ((robot, _), *_) = scenario.robots.values()
     doubt = uncertainty(task.uncertainty)
-    outcome = run_team("own-sensing", scenario, goal, doubt, task.seed, _LIMIT, world=task.world)
+    limit = _MAP_LIMIT if task.scenario in MAPS else _LIMIT
+    outcome = run_team("own-sensing", scenario, goal, doubt, task.seed, limit, world=task.world)
     row: Row = {
         "scenario": task.scenario,
         "seed": task.seed,
@@ -130,7 +158,7 @@ def trial(task: SensingTask) -> Row:
 def statistics(rows: list[Row]) -> dict[str, Any]:
     """Targets reached, and Lambda of those, by condition."""
     found: dict[str, Any] = {}
-    for name in CONDITIONS:
+    for name in (*CONDITIONS, *MAPS):
         mine = [r for r in rows if r["scenario"] == name]
         ways = [r["lambda"] for r in mine if r["success"]]
         if mine:
@@ -147,9 +175,9 @@ def statistics(rows: list[Row]) -> dict[str, Any]:
 
 def conclude(options: StudyOptions, tasks: Sequence[SensingTask], rows: list[Row]) -> None:
     """A line for each condition."""
-    print("\ncondition      reached      Lambda: mean, median, largest")
+    print("\ncondition               reached      Lambda: mean, median, largest")
     for name, s in statistics(rows).items():
         print(
-            f"{name:12s} {s['reached']:3d} of {s['of']:<3d}   {s['lambda_mean']:6.2f}  "
+            f"{name:21s} {s['reached']:3d} of {s['of']:<3d}   {s['lambda_mean']:6.2f}  "
             f"{s['lambda_median']:6.2f}  {s['lambda_max']:6.2f}"
         )

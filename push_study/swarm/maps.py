@@ -8,10 +8,11 @@ import numpy as np
 
 from push_job.method import Task
 from push_model import se2
+from push_model.arrays import Array
 from push_model.free_space import FreeSpace
 from push_model.occupancy import rasterise
 from push_model.settings import from_mapping
-from push_model.specs import EnvironmentSpec
+from push_model.specs import EnvironmentSpec, ObjectSpec
 from push_scenario.bodies import load_object, load_robot
 from push_scenario.files import find, read_yaml
 from push_scenario.scatter import scattered
@@ -60,17 +61,24 @@ def load_map(name: str) -> EnvironmentSpec:
     return from_mapping(EnvironmentSpec, read_yaml(path), str(path))
 
 
+def drawn(
+    name: str, item: ObjectSpec, seed: int, robots: int, turned: bool
+) -> tuple[Array, Array, Array]:
+    """Poses of the object at the start and at the goal ``(3,)``, whose heading is nan if headings
+    do not matter, and of robots at random places ``(robots, 3)``."""
+    random = np.random.default_rng([seed, robots])
+    (sx, sy), (gx, gy) = MAPS[name]
+    start = np.array([sx, sy, random.uniform(-math.pi, math.pi)])
+    goal = np.array([gx, gy, random.uniform(-math.pi, math.pi) if turned else math.nan])
+    outline = se2.transform(item.mass_pose(start), item.geometry.outline)
+    space, radius = FreeSpace(rasterise(load_map(name))), load_robot(ROBOT).footprint_radius
+    return start, goal, scattered(random, robots, space, outline, radius)
+
+
 def run(task: MapTask) -> Row:
     """To the map's goal, with headings at start and goal at random."""
-    item, robot = load_object(task.item), load_robot(ROBOT)
-    room = load_map(task.scenario)
-    random = np.random.default_rng([task.seed, task.robots])
-    (sx, sy), (gx, gy) = MAPS[task.scenario]
-    start = np.array([sx, sy, random.uniform(-math.pi, math.pi)])
-    goal = np.array([gx, gy, random.uniform(-math.pi, math.pi) if task.turned else math.nan])
-    radius = robot.footprint_radius
-    outline = se2.transform(item.mass_pose(start), item.geometry.outline)
-    begin = scattered(random, task.robots, FreeSpace(rasterise(room)), outline, radius)
+    item, robot, room = load_object(task.item), load_robot(ROBOT), load_map(task.scenario)
+    start, goal, begin = drawn(task.scenario, item, task.seed, task.robots, task.turned)
     swarm: dict[str, object] = {
         "position_tolerance": REACHED,
         "orientation_tolerance": TURNED,

@@ -18,8 +18,18 @@ def test_every_condition_has_room_and_settings_of_its_own(tmp_path):
         assert np.isnan(goal.goal[2]) and way == pytest.approx(1.98, abs=0.01)
         told.add((task.scenario, task.contest))
     assert len(told) == 2 * len(own_sensing.CONDITIONS), "both objects are pushed"
-    with pytest.raises(SettingsError, match="no condition called 'range-9'"):
+    with pytest.raises(SettingsError, match="no condition or map called 'range-9'"):
         own_sensing.tasks(StudyOptions(("range-9",), 1, 1, tmp_path))
+
+
+def test_a_map_is_tried_with_every_object_from_places_of_the_maps_study(tmp_path):
+    tasks = own_sensing.tasks(StudyOptions(("transport_middle",), 2, 1, tmp_path))
+    assert len({(t.contest, t.seed) for t in tasks}) == len(tasks) == 14
+    for task in tasks[:7]:
+        scenario, goal, way = own_sensing.scenario_of(task)
+        start = scenario.objects["object"][1]
+        assert np.allclose(start[:2], [0.0, -1.0]) and np.allclose(goal.goal[:2], [0.0, 1.0])
+        assert 2.5 < way < 4.0 and len(scenario.robots) == 20
 
 
 def test_a_slice_of_the_study_is_reached_and_prints_its_table(tmp_path, capsys):
