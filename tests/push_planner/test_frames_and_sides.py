@@ -16,7 +16,7 @@ from push_model.stick_certificate import ContactBelief, certified_limits
 from push_planner import PlanError, PlannerSettings, PlanningFailed, PushPlanner, push_sides
 from push_scenario.scenario import load_scenario
 
-QUICK = replace(PlannerSettings(), improvement_rounds=2)
+QUICK = replace(PlannerSettings(), improvement_rounds=2, arc_nodes=2000)
 GRID = rasterise(EnvironmentSpec((3.0, 2.0)))
 START, GOAL = np.array([-0.8, -0.3, 0.4]), np.array([0.7, 0.3, 1.2])
 BOX = [[0.0, 0.0], [0.09, 0.0], [0.09, 0.09], [0.0, 0.09]]

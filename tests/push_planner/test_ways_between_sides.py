@@ -11,7 +11,7 @@ from push_planner.bodies import with_bodies
 from push_planner.robot_path import has_way
 from push_scenario.scenario import load_scenario
 
-SETTINGS = PlannerSettings()
+SETTINGS = PlannerSettings(arc_nodes=2000)
 CORRIDOR = EnvironmentSpec((3.0, 0.22))
 WIDE = EnvironmentSpec((3.0, 1.0))
 
