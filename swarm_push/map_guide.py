@@ -25,7 +25,7 @@ _SPARE = 0.02  # [m] that a robot's way keeps from walls beside its radius
 _EMPTY = 0.4  # [m] from a place: a robot that does not see the object there knows that it has gone
 _ON = 0.3  # [m] along the route to where it looks next
 _MOVED = 0.1  # [m] that a place moves before the way to it is looked for again
-# Chosen on the four maps of ``swarm-maps``, with seeds 501 to 506 and 901 of its places.
+# Chosen on the four maps of ``swarm-maps``, with seeds 501 to 505, 901 to 906 and 1101.
 _PINS = 0.2  # cosine of the angle between a wall's normal and a push that is always allowed
 _STEP = 0.01  # [m] of the differences that give the direction of the nearest wall
 _MARGIN = 0.03  # [m] between the object and a wall that pushes at the wall leave
