@@ -24,8 +24,7 @@ _EACH = 0.02  # [s] of cost that a push more must save
 
 def pushes_over_arcs(
     scene: PushScene,
-    start: Array,
-    goal: Array,
+    ends: RunEnds,
     bound: float,
     robot: Array | None,
     nodes: int,
@@ -33,17 +32,13 @@ def pushes_over_arcs(
 ) -> Generator[None, None, tuple[PushStep, ...] | None]:
     """Search in slices for pushes that cost less than ``bound`` [s]; None if there are none.
 
-    start, goal: ``(3,)`` [m, m, rad] poses of the object's centre of mass. robot: ``(3,)`` pose of
-    the robot, or None. nodes: that each of the two searches may make.
+    robot: ``(3,)`` pose of the robot, or None. nodes: that each of the two searches may make.
     """
-    ends = RunEnds.of(scene, start, goal)
-    graph = PushGraph(scene, start, goal, NOTHING, np.inf, robot)
-    begins = np.array(
-        [bool(ends.leaves[k]) and graph.may_begin(k) for k in range(len(ends.leaves))]
-    )
+    graph = PushGraph(scene, ends.start, ends.goal, NOTHING, np.inf, robot)
+    begins = np.array([leaves and graph.may_begin(k) for k, leaves in enumerate(ends.leaves)])
     best: tuple[PushStep, ...] | None = None
     for backward in (False, True):
-        search = ArcSearch(scene, ends, start, goal, begins, backward, bound, nodes)
+        search = ArcSearch(scene, ends, begins, backward, bound, nodes)
         yield from search.run()
         if search.cost < math.inf:
             found = _pushes_along(scene, *search.path(), robot, statistics)

@@ -35,11 +35,11 @@ _WIDTH, _ANGLES = 0.03, 96  # [m] of a cell, at least; cells in a turn
 _MOST = 4_000_000  # cells: on a large map they are wider
 _STEP = 1.5  # widths of a cell that an arc is long
 _BENDS = np.array([-0.99, -0.5, 0.0, 0.5, 0.99])  # of the trusted curvatures
-_NEAR, _FAR = (
-    0.6,
-    4,
-)  # [m] from which each node is joined to the target; from farther off, each n-th
-_BEND_COST = 1.03  # of the time that a push straight on takes: guess for the last one
+_NEAR = 0.6  # [m] from the target: a push to it is tried from each node that is so near,
+_FAR = 4  # and from one in so many of the others
+_BEND_COST = (
+    1.03  # time of the push to the target, as a multiple of that of a straight one: a guess
+)
 _SLICE = 4000  # nodes between two reports
 
 
@@ -78,9 +78,10 @@ class _Costs(NamedTuple):
 
 
 class _Room(NamedTuple):
-    """Outlines [m], radii [m], and ``(sides,)`` [m] from contact to where the robot may turn;
-    turning, keeps: [m] clearances there and on the way back. needed: [m] clearance of all poses,
-    leaving: [m] that of the first ones, up to ``first`` [s] of cost. map: distance field."""
+    """Outlines ``(n, 2)`` [m], radii [m], and ``(sides, 2)`` [m] from contact to where the robot
+    may turn; turning, keeps: [m] clearances there and on the way back. needed: [m] clearance of
+    all poses, leaving: [m] that of the first ones, up to ``first`` [s] of cost. map: distance
+    field."""
 
     object_points: Any
     robot_points: Any
@@ -175,11 +176,14 @@ def _free(pose: Any, robot: Any, needed: float, room: Any) -> bool:
 def _may_change(robot: Any, side: int, room: Any) -> bool:
     """Whether the robot can back off from a contact."""
     field, ox, oy, scale = room.map
-    found = rooms_behind(
-        robot.reshape((1, 3)), room.backs[side], room.turning, room.keeps,
-        field, room.robot_points, ox, oy, scale,
-    )  # fmt: skip
-    return bool(found[0])
+    for back in room.backs[side]:
+        found = rooms_behind(
+            robot.reshape((1, 3)), back, room.turning, room.keeps, field, room.robot_points,
+            ox, oy, scale,
+        )  # fmt: skip
+        if found[0]:
+            return True
+    return False
 
 
 @numba.njit(cache=True)  # infinities: no fast mathematics
@@ -287,15 +291,13 @@ def _advance(
 class ArcSearch:
     """A search from the start, or backward from the goal. ``run`` does the work in slices.
 
-    cost: [s] about what the plan costs; infinite while none was found. expanded: number of nodes.
+    cost: [s] about what the plan costs; infinite while none was found.
     """
 
     def __init__(
         self,
         scene: PushScene,
         ends: RunEnds,
-        start: Array,
-        goal: Array,
         begins: NDArray[np.bool_],
         backward: bool,
         bound: float,
@@ -303,13 +305,13 @@ class ArcSearch:
     ) -> None:
         """Prepare the search.
 
-        start, goal: ``(3,)`` [m, m, rad] poses of the object's centre of mass. begins: ``(sides,)``
-        whether the robot can come to the side at the start. backward: from the goal to the start.
-        bound: [s] the plan must cost less. most: number of nodes at most.
+        begins: ``(sides,)`` whether the robot has room at the side at the start, and a way to it.
+        backward: from the goal to the start. bound: [s] the plan must cost less. most: number of
+        nodes at most.
         """
         settings, time, sides = scene.settings, scene.time, scene.sides
-        pose, self._target = (goal, start) if backward else (start, goal)
-        begins, self._backward = ends.leaves & begins, backward
+        pose, self._target = (ends.goal, ends.start) if backward else (ends.start, ends.goal)
+        self._backward = backward
         known = ends.radii, ends.fastest
         if backward:
             gone = ends.gone
@@ -369,11 +371,6 @@ class ArcSearch:
     def cost(self) -> float:
         """See the class."""
         return float(self._tree.best[0]) if self._tree.best[1] >= 0.0 else math.inf
-
-    @property
-    def expanded(self) -> int:
-        """See the class."""
-        return int(self._tree.counts[2])
 
     def run(self) -> Iterator[None]:
         """Search; yields after each slice."""

@@ -12,10 +12,11 @@ plan is therefore at least the smallest of these:
 - three runs or more: the distance that the centre must move, or the length in which the object can
   turn as far as it must, and the times to speed up and to brake three times and of two changes.
 
-The first push needs room for the robot at the start, the last one at the goal; other sides do not
-count there. The smallest sum over poses is found by branch and bound. A box of positions and
-headings has a bound of its own, and the box with the lowest bound is divided next. The work may
-stop at any time: the lowest bound of the boxes that are left is valid.
+Obstacles may block the shortest single run (single_run.py). At a change of the side, object and
+robot need room. The first push needs room for the robot at the start, the last one at the goal;
+other sides do not count there. The smallest sum over poses is found by branch and bound. A box of
+positions and headings has a bound of its own, and the box with the lowest bound is divided next.
+The work may stop at any time: the lowest bound of the boxes that are left is valid.
 """
 
 import heapq
@@ -30,7 +31,7 @@ from push_model import se2
 from push_model.arrays import Array
 from push_model.distance_field import lookup
 from push_planner.least_way import way_at
-from push_planner.run_bounds import run_length, run_time, stands, wrapped
+from push_planner.run_bounds import part_of_run, run_length, run_time, stands
 from push_planner.run_ends import RunEnds
 from push_planner.scene import TURNING, PushScene
 from push_planner.single_run import least_single_run
@@ -74,7 +75,7 @@ def _of_boxes(
     speeds, begin: see ``run_time``; [s] that each run takes longer.
     gone, left, places: levels of ``RunEnds.gone`` and ``.left``; their ox, oy and scale.
     keeps: [m] distance to obstacles of the centre, of the bodies, of the robot behind a contact.
-    bodies: outlines of object and robot, radii [m], and ``(sides,)`` [m] from contact to behind it.
+    bodies: see ``PushScene.bodies``.
     """
     n, sides = boxes.shape[0], contacts.shape[0]
     result = np.full(n, math.inf)
@@ -86,7 +87,7 @@ def _of_boxes(
         off = half * math.sqrt(2.0)
         if lookup(field, x, y, ox, oy, scale) + off + rounding < keeps[0]:
             continue
-        about = off + 2.0 * object_radius * math.sin(0.5 * min(slack, math.pi))
+        about = off + 2.0 * object_radius * math.sin(0.5 * slack)
         if about < _SMALL and not stands(
             object_points, object_radius, x, y, theta, keeps[1] - about - rounding,
             field, ox, oy, scale,
@@ -101,10 +102,12 @@ def _of_boxes(
             rx, ry, angle = x + c * gx - s * gy, y + s * gx + c * gy, theta + turned
             around = off + 2.0 * math.hypot(gx, gy) * math.sin(0.5 * slack)
             if around < _SMALL:
-                back = backs[side]
-                bx, by = rx - back * math.cos(angle), ry - back * math.sin(angle)
-                sway = around + 2.0 * back * math.sin(0.5 * slack) + rounding
-                if lookup(field, bx, by, ox, oy, scale) + sway < keeps[2]:
+                free = False
+                for back in backs[side]:
+                    bx, by = rx - back * math.cos(angle), ry - back * math.sin(angle)
+                    sway = around + 2.0 * back * math.sin(0.5 * slack) + rounding
+                    free |= lookup(field, bx, by, ox, oy, scale) + sway >= keeps[2]
+                if not free:
                     continue
                 sway = around + 2.0 * robot_radius * math.sin(0.5 * slack) + rounding
                 if not stands(
@@ -114,17 +117,18 @@ def _of_boxes(
             there, here = radii[side], radii[side, ::-1]
             ax, ay, before = starts[side]
             if leaves[side]:
-                length = run_length(ax, ay, before, rx, ry, angle, there, around, slack)
-                turn = max(0.0, abs(wrapped(angle - before)) - slack)
-                first[side] = run_time(max(length, way / fastest[side]), turn, speeds)
+                length, turn = part_of_run(
+                    ax, ay, before, rx, ry, angle, there, way / fastest[side], around, slack
+                )
+                first[side] = run_time(length, turn, speeds)
             bx, by, after = goals[side]
             if arrives[side]:
                 # The way into the goal, driven backward: left turns become right ones.
-                length = run_length(
-                    bx, by, after + math.pi, rx, ry, angle + math.pi, here, around, slack
-                )
-                turn = max(0.0, abs(wrapped(after - angle)) - slack)
-                second[side] = run_time(max(length, rest / fastest[side]), turn, speeds)
+                length, turn = part_of_run(
+                    bx, by, after + math.pi, rx, ry, angle + math.pi, here, rest / fastest[side],
+                    around, slack,
+                )  # fmt: skip
+                second[side] = run_time(length, turn, speeds)
         for a in range(sides):
             for b in range(sides):
                 result[k] = min(result[k], first[a] + second[b] + changes[a, b])
@@ -148,7 +152,7 @@ class CostBound:
         start, goal: ``(3,)`` [m, m, rad] poses of the object's centre of mass, world frame.
         """
         settings, time = scene.settings, scene.time
-        self._scene, self._start, self._goal = scene, start, goal
+        self._scene = scene
         ends = self.ends = RunEnds.of(scene, start, goal)
         changes = time.changes.copy()
         np.fill_diagonal(changes, math.inf)
@@ -187,7 +191,8 @@ class CostBound:
     def run(self, boxes: int, cost: float = math.inf) -> Iterator[None]:
         """Raise the bound by dividing up to so many boxes. Yields after each slice.
 
-        cost: [s] of a known plan; the bound is not raised above it.
+        boxes: of changes of the side; with 0, the bound stays as it is. cost: [s] of a known plan;
+        the bound is not raised above it.
         """
         if boxes > 0:
             yield from self._raise_two(boxes, min(self.several, cost))
@@ -200,9 +205,7 @@ class CostBound:
             if begin + self._runs[side] >= most:
                 break
             least = float(self._runs[side])
-            for bound in least_single_run(
-                self._scene, self.ends, self._start, self._goal, int(side), most - begin
-            ):
+            for bound in least_single_run(self._scene, self.ends, int(side), most - begin):
                 self._runs[side] = max(least, bound)
                 self.one = max(self.one, begin + float(self._runs.min()))
                 yield

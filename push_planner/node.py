@@ -116,12 +116,15 @@ class PlannerNode(Node):
         if self._grid is None:
             self.create_service(PlanRobotPath, self._paths, self._on_robot_path)
         self._grid, self._field = grid, None
-        self._plan_anew()
+        self._plan_anew(self._first_map.awaited)
 
-    def _plan_anew(self) -> None:
-        """The map or the belief is another one: a plan under way is dropped and begun anew."""
+    def _plan_anew(self, waiting: bool = False) -> None:
+        """The map or the belief is another one: a plan under way is dropped and begun anew.
+
+        waiting: whether a request waits that can begin now.
+        """
         self._planners.clear()
-        if self._first_map.awaited or self._work is not None:
+        if waiting or self._work is not None:
             self._begin(self._request)
 
     def _on_no_map(self) -> None:

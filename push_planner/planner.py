@@ -28,6 +28,7 @@ from push_planner.push_plan import (
 from push_planner.push_reference import push_reference
 from push_planner.push_search import PushSearch
 from push_planner.refusal import check_pose, check_room, check_way, sides_shut_off, why_not
+from push_planner.run_ends import RunEnds
 from push_planner.scene import PushScene
 from push_planner.settings import PlannerSettings
 from push_planner.thesis_search import ThesisSearch, poses_on
@@ -72,7 +73,7 @@ class PushPlanner:
         check_pose(self.scene, pose, what, occupied)
 
     def lower_bound(self, start: Array, goal: Array) -> float:
-        """[s] that no plan can cost less than, without the work on two runs (cost_bound.py)."""
+        """[s] that no plan can cost less than, before searches raise it (cost_bound.py)."""
         if not self.scene.sides:
             return np.inf
         start, goal = (self.scene.item.mass_pose(pose) for pose in (start, goal))
@@ -89,7 +90,7 @@ class PushPlanner:
         """Plan in small slices: each ``next`` does a little work and reports.
 
         thorough: whether a long search follows where the others find no plan, and whether the lower
-        bound is raised by the work on two runs. robot: ``(3,)`` pose of the robot, from which it
+        bound is raised by searches. robot: ``(3,)`` pose of the robot, from which it
         must have a way to the first side; None if unknown.
 
         The last report carries the final plan, with the lower bound of all costs. A plan that is
@@ -130,7 +131,7 @@ class PushPlanner:
             yield Progress("lower bound of the cost", best)
         work.least = bound.value
         if settings.planner == "lazy":
-            best = yield from self._improved(best, ends, guides, work)
+            best = yield from self._improved(best, ends, guides, bound.ends, work)
         if settings.planner == "lazy" and settings.easing > 0.0:
             yield Progress("wider bends", best)
             best = self._eased(best, work)
@@ -186,7 +187,7 @@ class PushPlanner:
             yield Progress("improving", self._assemble(search.solution, ends[1], guide, work))
 
     def _improved(
-        self, best: PushPlan, ends: _Ends, guides: Guides, work: Work
+        self, best: PushPlan, ends: _Ends, guides: Guides, run_ends: RunEnds, work: Work
     ) -> Generator[Progress, None, PushPlan]:
         """Search below the cost of the best plan: along another guide path, over arcs, then near
         its poses. Returns the best plan."""
@@ -198,7 +199,7 @@ class PushPlanner:
             if bound <= work.least:
                 break
             if number == 1 and best.cost > (1.0 + _NEAR_BOUND) * work.least:
-                best = yield from self._over_arcs(best, ends, work)
+                best = yield from self._over_arcs(best, ends[1], run_ends, work)
                 yield Progress("improving", best)
                 bound = (1.0 - _WORTH) * best.cost
             if work.left <= 0:
@@ -229,18 +230,16 @@ class PushPlanner:
         return best
 
     def _over_arcs(
-        self, best: PushPlan, ends: _Ends, work: Work
+        self, best: PushPlan, goal: Array, run_ends: RunEnds, work: Work
     ) -> Generator[Progress, None, PushPlan]:
         """Search over arcs below the cost of the best plan. Returns the best plan."""
-        scene, bound = self.scene, (1.0 - _WORTH) * best.cost
-        start, goal = (scene.item.mass_pose(pose) for pose in ends)
-        nodes, statistics = self.settings.arc_nodes, work.statistics
-        search = pushes_over_arcs(scene, start, goal, bound, work.robot, nodes, statistics)
+        bound, nodes = (1.0 - _WORTH) * best.cost, self.settings.arc_nodes
+        search = pushes_over_arcs(self.scene, run_ends, bound, work.robot, nodes, work.statistics)
         while True:
             try:
                 next(search)
             except StopIteration as end:
-                found = end.value and self._assemble(end.value, ends[1], best.guide, work)
+                found = end.value and self._assemble(end.value, goal, best.guide, work)
                 return best if found is None else found
             yield Progress("search over arcs", best)
 

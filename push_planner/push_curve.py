@@ -31,6 +31,7 @@ def basis_rows(n: int) -> Array:
 
 
 BASIS_COARSE, BASIS_DENSE = basis_rows(_COARSE), basis_rows(_DENSE)
+"""Rows for ``solve_curve``: of the samples that it searches with, and of the final check."""
 
 
 @numba.njit(cache=True, fastmath=True)

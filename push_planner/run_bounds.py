@@ -38,6 +38,20 @@ def stands(
 
 
 @numba.njit(cache=True)
+def part_of_run(
+    x: float, y: float, theta: float, bx: float, by: float, angle: float, radii: Any, way: float,
+    off: float, slack: float,
+) -> tuple[float, float]:  # fmt: skip
+    """Least length [m] and turn [rad] of a run from (x, y, theta) to about (bx, by, angle).
+
+    radii: [m] smallest turning radii to the left and to the right. way: [m] it is at least so long.
+    off, slack: [m], [rad] how far the last pose may be from (bx, by, angle).
+    """
+    length = run_length(x, y, theta, bx, by, angle, radii, off, slack)
+    return max(length, way), max(0.0, abs(wrapped(angle - theta)) - slack)
+
+
+@numba.njit(cache=True)
 def run_length(
     x: float, y: float, theta: float, bx: float, by: float, angle: float, radii: Any,
     off: float, slack: float,

@@ -19,15 +19,17 @@ from push_planner.scene import PushScene
 class RunEnds:
     """The sides at a start and at a goal, and the way of the centre of mass between them.
 
-    contacts: ``(sides, 3)`` poses of the robot in contact, in the frame of the object. starts,
-    goals: ``(sides, 3)`` the same in the world, at the start and at the goal. leaves, arrives:
+    start, goal: ``(3,)`` [m, m, rad] poses of the object's centre of mass, world frame. contacts:
+    ``(sides, 3)`` poses of the robot in contact, in the frame of the object. starts, goals:
+    ``(sides, 3)`` the same in the world, at the start and at the goal. leaves, arrives:
     ``(sides,)`` whether the robot has room there. radii: ``(sides, 2)`` [m] smallest turning radii
     to the left and to the right. fastest: ``(sides,)`` how far the centre moves at most while the
     robot drives 1 m. nearest: [m] distance of object and robot to obstacles at any pose. least:
-    [m] that of the centre. gone, left: its least ways
-    from the start and to the goal.
+    [m] that of the centre. gone, left: its least ways from the start and to the goal.
     """
 
+    start: Array
+    goal: Array
     contacts: Array
     starts: Array
     goals: Array
@@ -51,6 +53,8 @@ class RunEnds:
         nearest = min(keeps, scene.settings.safety_distance)
         least = floor + nearest if floor > 0.0 else 0.0
         return RunEnds(
+            start,
+            goal,
             np.array([se2.inverse(s.grasp) for s in sides]),
             starts,
             goals,

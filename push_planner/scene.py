@@ -163,9 +163,9 @@ class PushScene:
 
     @property
     def bodies(self) -> tuple[Array, Array, float, float, Array]:
-        """Outlines ``(n, 2)`` [m] of object and robot, their radii [m], and for each side how far
-        the robot backs off from it at least [m]."""
-        backs = np.array([self.backs(side)[1] for side in self.sides])
+        """Outlines ``(n, 2)`` [m] of object and robot, their radii [m], and ``(sides, 2)`` [m] how
+        far the robot may back off, see ``backs``."""
+        backs = np.array([self.backs(side) for side in self.sides])
         points = self._object_points, self._robot_points
         return *points, self.shape.circumradius, self._robot_radius, backs
 

@@ -100,8 +100,8 @@ class PlannerSettings:
         150000,
         low=100,
         high=15000000,
-        doc="Maximum number of object poses in the search over arcs, which looks for a cheaper "
-        "plan than the first one",
+        doc="Maximum number of object poses in each of the two searches over arcs (from the start "
+        "and from the goal), which lower the cost of the plan",
     )
     refinement: float = bounded(
         0.15,

@@ -20,7 +20,7 @@ from push_model import heap
 from push_model.arrays import Array
 from push_model.distance_field import lookup
 from push_planner.least_way import way_at
-from push_planner.run_bounds import run_length, run_time, stands, wrapped
+from push_planner.run_bounds import part_of_run, run_time, stands
 from push_planner.run_ends import RunEnds
 from push_planner.scene import PushScene
 
@@ -53,15 +53,16 @@ def _through(
     sway = around + 2.0 * robot_radius * math.sin(0.5 * slack) + rounding
     if not stands(robot_points, robot_radius, rx, ry, angle, keeps[1] - sway, field, ox, oy, scale):
         return math.inf
-    there = run_length(start[0], start[1], start[2], rx, ry, angle, radii, around, slack)
-    # The way to the goal, driven backward: left turns become right ones.
-    on = run_length(
-        goal[0], goal[1], goal[2] + math.pi, rx, ry, angle + math.pi, radii[::-1], around, slack
+    way = way_at(gone, x, y, half, place_x, place_y, place_scale) / fastest
+    there, turned = part_of_run(
+        start[0], start[1], start[2], rx, ry, angle, radii, way, around, slack
     )
-    there = max(there, way_at(gone, x, y, half, place_x, place_y, place_scale) / fastest)
-    on = max(on, way_at(left, x, y, half, place_x, place_y, place_scale) / fastest)
-    turned = max(0.0, abs(wrapped(angle - start[2])) - slack)
-    turns = max(0.0, abs(wrapped(goal[2] - angle)) - slack)
+    # The way to the goal, driven backward: left turns become right ones.
+    way = way_at(left, x, y, half, place_x, place_y, place_scale) / fastest
+    on, turns = part_of_run(
+        goal[0], goal[1], goal[2] + math.pi, rx, ry, angle + math.pi, radii[::-1], way, around,
+        slack,
+    )  # fmt: skip
     return float(run_time(there + on, turned + turns, speeds))
 
 
@@ -102,15 +103,12 @@ def _advance(
     return bound, False
 
 
-def least_single_run(
-    scene: PushScene, ends: RunEnds, start: Array, goal: Array, side: int, most: float
-) -> Iterator[float]:
+def least_single_run(scene: PushScene, ends: RunEnds, side: int, most: float) -> Iterator[float]:
     """Lower bounds [s] of the time of a run on a side, without what it takes to speed up and brake.
 
     Yields one after each slice of the work; each is valid, and none is less than the one before.
 
-    start, goal: ``(3,)`` poses of the object's centre of mass. side: number of it. most: [s] the
-    bound is not raised above it.
+    side: number of it. most: [s] the bound is not raised above it.
     """
     x0, x1, y0, y1 = scene.field.grid.extent
     width = max(_WIDTH, math.sqrt((x1 - x0) * (y1 - y0) * _ANGLES / _MOST))
@@ -129,11 +127,11 @@ def least_single_run(
         return (indices[0] * columns + indices[1]) * _ANGLES + indices[2]
 
     keys, items = np.empty(seen.size), np.empty(seen.size, dtype=np.int64)
-    counts = np.array([heap.push(keys, items, 0, 0.0, number(box(start)))])
-    seen[box(start)] = True
+    counts = np.array([heap.push(keys, items, 0, 0.0, number(box(ends.start)))])
+    seen[box(ends.start)] = True
     object_points, robot_points, object_radius, robot_radius, _ = scene.bodies
     known = (
-        *(np.array([x0, y0]), width, number(box(goal)), _NEXT),
+        *(np.array([x0, y0]), width, number(box(ends.goal)), _NEXT),
         (ends.starts[side], ends.goals[side], ends.contacts[side], ends.radii[side],
          float(ends.fastest[side])),
         scene.time.speeds,

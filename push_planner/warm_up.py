@@ -34,9 +34,10 @@ def warm_up(settings: PlannerSettings, robot: RobotSpec, item: ObjectSpec) -> No
     planner = PushPlanner(quick, grid, robot, item)
     ends = np.zeros(3), np.array([0.3, 0.0, 0.0])
     planner.solve(*ends)
-    for _ in pushes_over_arcs(planner.scene, *ends, np.inf, None, _NODES, SearchStatistics()):
+    known = RunEnds.of(planner.scene, *ends)
+    for _ in pushes_over_arcs(planner.scene, known, np.inf, None, _NODES, SearchStatistics()):
         pass
-    for _ in least_single_run(planner.scene, RunEnds.of(planner.scene, *ends), *ends, 0, 1.0):
+    for _ in least_single_run(planner.scene, known, 0, 1.0):
         pass
     near = half - _CELL - robot.footprint_radius - 0.5 * settings.safety_distance
     beside, away = np.array([-near, 0.0, 0.0]), np.array([0.5 * half, 0.5 * half, 1.0])

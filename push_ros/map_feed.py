@@ -55,9 +55,7 @@ class FirstMap:
         self._missed, self._since = missed, 0.0
         self.awaited = False
         """Whether a request waits; set it to False when it has begun or ended."""
-        self._timer = node.create_timer(
-            0.5, self._on_timer, clock=Clock(clock_type=ClockType.STEADY_TIME)
-        )
+        node.create_timer(0.5, self._on_timer, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def wait(self) -> None:
         """A request waits from now on."""

@@ -5,23 +5,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import shapely
 from ompl import base as ob
 from scipy.optimize import minimize
-from scipy.sparse.csgraph import dijkstra
 
 from benchmarks.plan import cluttered, exhaustive, problems
 from push_model import se2
-from push_model.distance_field import DistanceField
-from push_model.free_space import FreeSpace
 from push_model.kinematics import unicycle_step
 from push_model.occupancy import OccupancyGrid, rasterise
 from push_model.settings import from_mapping
-from push_model.specs import EnvironmentSpec
+from push_model.specs import CircleSpec, EnvironmentSpec
 from push_planner import PlannerSettings, PlanningFailed, PushPlanner
 from push_planner.cost_bound import CostBound
 from push_planner.dubins_bound import least_length
-from push_planner.least_way import least_ways
 from push_planner.run_ends import RunEnds
 from push_planner.single_run import least_single_run
 
@@ -227,85 +222,6 @@ def test_it_is_near_the_best_plan_of_two_runs(robot, box):
     assert np.median(gaps) < 0.06 and max(gaps) < 0.25
 
 
-def test_ways_about_obstacles_are_never_over_estimated(robot, box):
-    """Against paths that a disc can take."""
-    ratios = []
-    for seed in range(12):
-        grid = rasterise(cluttered(seed))
-        field, random = DistanceField(grid), np.random.default_rng(seed)
-        least = box.geometry.inradius + 0.012
-        space = FreeSpace(grid)
-        x0, x1, y0, y1 = grid.extent
-        for _ in range(15):
-            a, b = (random.uniform([x0, y0], [x1, y1]) for _ in range(2))
-            if min(space.clearance(np.array([a, b]))) < least:
-                continue
-            reach = space.from_here(a, least)
-            while not reach.settle(100000):
-                pass
-            way = reach.way_to(b)
-            if way is None:
-                continue
-            length = float(np.hypot(*np.diff(way, axis=0).T).sum())
-            lower = least_ways(field, a, least).at(b)
-            assert lower <= length + 1e-9
-            ratios.append(lower / length)
-    assert len(ratios) > 60 and np.median(ratios) > 0.85
-
-
-def rectangles(random, slalom):
-    """``(100, 100)`` cells: nine rectangles, or thin walls of which each turns the way."""
-    cells = np.zeros((100, 100), dtype=bool)
-    if not slalom:
-        for _ in range(9):
-            (i, j), (height, width) = random.integers(10, 75, 2), random.integers(1, 20, 2)
-            cells[i : i + height, j : j + width] = True
-        return cells
-    for k, column in enumerate(range(12, 88, random.integers(8, 13))):
-        end = int(random.integers(48, 60))
-        cells[slice(12, end) if k % 2 else slice(100 - end, 88), column] = True
-    return cells
-
-
-def shortest_ways(obstacles, ends, least):
-    """``(n, n)`` [m] ways that keep a distance: at most 1 % longer than the shortest ones."""
-    away = least / math.cos(math.pi / 32.0) + 1e-4  # eight chords about each quarter of a turn
-    blocked = shapely.buffer(obstacles, away, quad_segs=8)
-    corners = shapely.get_coordinates(blocked)
-    points = np.concatenate([ends, corners])
-    lines = shapely.linestrings(np.stack(np.broadcast_arrays(points[:, None], points), axis=2))
-    within = shapely.buffer(blocked, -1e-6)
-    shapely.prepare(within)
-    apart = np.hypot(*(points[:, None] - points).transpose(2, 0, 1))
-    apart[shapely.intersects(within, lines)] = 0.0  # no edge
-    return dijkstra(apart, indices=range(len(ends)))[:, : len(ends)]
-
-
-@pytest.mark.parametrize("slalom", [False, True])
-def test_ways_about_rectangles_are_never_over_estimated(slalom):
-    """Against the shortest ways of a visibility graph."""
-    size, least, ratios, bent = 0.05, 0.112, [], 0
-    for seed in range(4):
-        random = np.random.default_rng(seed)
-        cells = rectangles(random, slalom)
-        field = DistanceField(OccupancyGrid(cells, size, np.zeros(2)))
-        i, j = np.nonzero(cells)
-        obstacles = shapely.union_all(
-            shapely.box(j * size, i * size, (j + 1) * size, (i + 1) * size)
-        )
-        ends = random.uniform(0.4, 4.6, (40, 2))
-        ends = ends[shapely.distance(obstacles, shapely.points(ends)) > least + 0.01]
-        for a, ways in zip(ends, shortest_ways(obstacles, ends, least), strict=True):
-            for b, way in zip(ends, ways, strict=True):
-                straight = float(np.hypot(*(b - a)))
-                if straight > 0.5 and way < math.inf:
-                    lower = least_ways(field, a, least).at(b)
-                    assert lower <= way
-                    ratios.append(lower / way)
-                    bent += way > 1.05 * straight
-    assert len(ratios) > 2000 and bent > 200 and np.median(ratios) > 0.85
-
-
 def random_run(scene, random):
     """A run of random arcs among obstacles: side, start and end of the object, time [s]."""
     x0, x1, y0, y1 = scene.field.grid.extent
@@ -339,7 +255,7 @@ def test_no_run_among_obstacles_takes_less_time(robot, box, count):
             if spent == 0.0:
                 continue
             ends = RunEnds.of(scene, start, goal)
-            bounds = list(least_single_run(scene, ends, start, goal, side, math.inf))
+            bounds = list(least_single_run(scene, ends, side, math.inf))
             assert bounds == sorted(bounds) and bounds[-1] <= spent + 1e-9
             ratios.append(bounds[-1] / spent)
     assert len(ratios) == count and np.median(ratios) > 0.8
@@ -356,7 +272,7 @@ def test_a_wall_across_the_way_raises_the_bound_of_one_run(robot, box):
         scene = PushPlanner(PlannerSettings(), grid, robot, box).scene
         ends = RunEnds.of(scene, start, goal)
         side = next(k for k, s in enumerate(scene.sides) if abs(s.contact.heading) < 0.1)
-        *_, last = least_single_run(scene, ends, start, goal, side, 60.0)
+        *_, last = least_single_run(scene, ends, side, 60.0)
         found.append(last)
     free, aside, shut = found
     assert free < 1.6 * scene.time.pace + 1e-6 < 1.2 * free
@@ -390,6 +306,32 @@ def test_boxes_in_which_something_can_stand_are_not_left_out(robot, box, count):
             assert wide <= exact + 1e-9
             finite += np.isfinite(wide)
     assert asked == count and finite > 0.5 * count
+
+
+def test_a_side_may_be_left_where_only_the_farther_place_behind_it_has_room(robot, box):
+    """Two posts beside the robot where it would turn, had it backed off half as far."""
+    planner = PushPlanner(PlannerSettings(), rasterise(EnvironmentSpec((3.0, 2.0))), robot, box)
+    side = planner.scene.sides[0]
+    near = planner.scene.backs(side)[1]
+    pose, found = np.zeros(3), 0
+    ends = se2.compose(pose, np.array([-0.6, 0.0, 0.0])), np.array([0.6, 0.4, 0.5])
+    for gap in np.arange(0.056, 0.07, 0.002):
+        posts = []
+        for across in (-gap, gap):
+            offset = np.array([-near, across + math.copysign(0.01, across), 0.0])
+            posts.append(CircleSpec(tuple(se2.compose(side.robot_pose(pose), offset)[:2]), 0.01))
+        grid = rasterise(EnvironmentSpec((3.0, 2.0), circles=tuple(posts), resolution=0.002))
+        scene = PushPlanner(PlannerSettings(), grid, robot, box).scene
+        contact = scene.sides[0].robot_pose(pose)
+        there = se2.compose(contact, np.array([-near, 0.0, 0.0]))
+        turning = robot.footprint_radius + 0.25 * scene.settings.safety_distance
+        if not scene.has_room(contact, scene.sides[0]) or scene.field.at(*there[:2]) >= turning:
+            continue
+        found += 1
+        within, free = (CostBound(s, *ends) for s in (scene, planner.scene))
+        here = np.array([[*pose, 0.0, 0.0]])
+        assert within.of_boxes(here)[0] == pytest.approx(free.of_boxes(here)[0], rel=0.02)
+    assert found > 0
 
 
 @pytest.mark.long

@@ -161,8 +161,12 @@ def test_a_request_that_is_cancelled_before_the_first_map_does_not_begin_with_it
 
 
 def test_without_a_map_a_request_ends_and_says_why(unmapped, monkeypatch):
+    """New beliefs meanwhile do not make it wait longer."""
     monkeypatch.setattr(map_feed, "PATIENCE", 0.5)
-    result = unmapped.result(unmapped.send())
+    answer = unmapped.send().get_result_async()
+    believed = unmapped.planner._plan_anew  # what each new belief does
+    assert unmapped.spinner.until(lambda: bool(believed() or answer.done()), 10.0)
+    result = answer.result().result
     assert result.error_code == R.NO_MAP and result.error_msg == "no map has been received on /map"
 
 
