@@ -45,8 +45,9 @@ class OpenRoomSettings:
         120.0,
         low=1.0,
         high=3600.0,
-        doc="Time after which the job fails if the object has come no closer to its target (s). In "
-        "a room with walls in it, the length of its way round them counts",
+        doc="Time after which the job fails if the object has come no closer to its target (s). "
+        "In a room with inner walls, the distance to the target is the length of the route around "
+        "them",
     )
     seed: int = bounded(0, low=0, high=2**31 - 1, doc="Seed of the random numbers of this method.")
 

@@ -53,8 +53,8 @@ class RearrangementSettings:
     )
     aside: tuple[float, ...] = bounded(
         (0.15, 0.25, 0.4, 0.6),
-        doc="Distances by which an object that bars the way of another one is moved (m), nearest "
-        "first.",
+        doc="Distances by which an object that blocks the path of another one is moved (m), "
+        "nearest first.",
     )
     max_plans: int = bounded(
         200,
@@ -67,8 +67,8 @@ class RearrangementSettings:
         3,
         low=0,
         high=100,
-        doc="How often the moves are planned again after a move has failed, or because an object "
-        "is not at its goal after the last move.",
+        doc="Maximum number of times that the moves are planned again, because a move has failed "
+        "or an object is not at its goal after the last move.",
     )
 
     def __post_init__(self) -> None:

@@ -19,15 +19,15 @@ class PlannerSettings:
         1.0,
         low=0.0,
         high=100.0,
-        doc="Weight lambda_1 of the path length in the cost (2.1) of the thesis, of the guide path "
+        doc="Weight lambda_1 of the path length in the cost of a guide path, (2.1) of the thesis "
         "(dimensionless)",
     )
     clearance_weight: float = bounded(
         0.05,
         low=0.0,
         high=100.0,
-        doc="Weight lambda_2 of the inverse clearance in the cost (2.1) of the thesis, of the "
-        "guide path (m^2)",
+        doc="Weight lambda_2 of the inverse clearance in the cost of a guide path, (2.1) of the "
+        "thesis (m^2)",
     )
     clearance_levels: int = bounded(
         4, low=1, high=20, doc="Number of minimum clearances for which a guide path is searched"
@@ -52,7 +52,7 @@ class PlannerSettings:
     )
     run_lengths: tuple[float, ...] = bounded(
         (0.15, 0.3, 0.6),
-        doc="Lengths of pushes out of the start and into the goal whose ends are tried as "
+        doc="Lengths of the pushes from the start and to the goal whose other ends are tried as "
         "poses of the object (m)",
     )
     scattered_poses: tuple[int, ...] = bounded(
@@ -64,15 +64,15 @@ class PlannerSettings:
         150,
         low=0,
         high=100000,
-        doc="Number of object poses two pushes away from start and from goal that each further "
-        "search adds",
+        doc="Number of object poses, two pushes away from start or goal, that each further search "
+        "adds",
     )
     heuristic_weight: float = bounded(
         3.0,
         low=1.0,
         high=100.0,
-        doc="Weight of the estimated cost-to-go, used if a search with weight 1 does not "
-        "finish (dimensionless)",
+        doc="Weight of the estimated cost-to-go in a repeated search, after a search with weight "
+        "1 has reached max_expansions without a plan (dimensionless)",
     )
     max_expansions: int = bounded(
         1200, low=1, high=10000000, doc="Maximum number of pushes that one search evaluates"
@@ -81,8 +81,8 @@ class PlannerSettings:
         30000,
         low=1,
         high=10000000,
-        doc="Maximum number of pushes that are evaluated until a first plan is found. The part "
-        "that the searches with max_expansions leave is used for a last, long search",
+        doc="Maximum number of pushes that are evaluated until a first plan is found. A last, "
+        "long search uses what the searches before it have left",
     )
     improvement_expansions: int = bounded(
         1500,
@@ -100,8 +100,8 @@ class PlannerSettings:
         150000,
         low=100,
         high=15000000,
-        doc="Maximum number of object poses in each of the two searches over arcs (from the start "
-        "and from the goal), which lower the cost of the plan",
+        doc="Maximum number of object poses in each of the two searches over arcs (forward and "
+        "backward), which look for a plan with a lower cost",
     )
     refinement: float = bounded(
         0.15,
@@ -114,15 +114,15 @@ class PlannerSettings:
         2000,
         low=0,
         high=10000000,
-        doc="Maximum number of boxes that are divided to raise the lower bound of the cost of the "
-        "final plan",
+        doc="Maximum number of boxes of object poses that are divided to raise the lower bound on "
+        "the cost of the final plan",
     )
     contact_time: float = bounded(
         2.5,
         low=0.0,
         high=100.0,
-        doc="Time of each change of the pushed side for backing off and approaching, in addition "
-        "to the drive around the object (s)",
+        doc="Time that each change of the pushed side costs in a plan for backing off and "
+        "approaching, in addition to the drive around the object (s)",
     )
     friction_trust: float = bounded(
         0.75,
@@ -135,9 +135,9 @@ class PlannerSettings:
         0.9,
         low=0.1,
         high=1.0,
-        doc="Fraction that plans may use of the curvatures that are stable for all frictions and "
-        "centres of mass within the believed intervals; used where it allows more than "
-        "friction_trust (dimensionless)",
+        doc="Fraction of the certified curvature limits that plans may use, where it allows more "
+        "than friction_trust. Within these limits a push is stable for all frictions and centres "
+        "of mass within the believed intervals (dimensionless)",
     )
     easing: float = bounded(
         0.06,

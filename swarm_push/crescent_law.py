@@ -110,9 +110,9 @@ class CrescentLawSettings:
         0.3,
         low=0.0,
         high=0.99,
-        doc="Lowest speed at which the outline moves away from the place of a robot during the "
-        "desired motion, as a fraction of the highest such speed along the outline; places with a "
-        "lower speed are not used (dimensionless)",
+        doc="Places are not used at which the outline of the object, during the desired motion, "
+        "moves away from the robot more slowly than this fraction of the highest such speed along "
+        "the outline (dimensionless)",
     )
     hold: float = bounded(
         0.25,

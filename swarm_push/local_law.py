@@ -78,15 +78,16 @@ class LocalLawSettings:
         0.3,
         low=0.0,
         high=100.0,
-        doc="Speed along the outline of a robot that is in contact, divided by its distance from "
-        "the middle between its neighbours (1/s)",
+        doc="Speed at which a robot in contact moves along the outline of the object, divided by "
+        "its distance from the middle between its neighbours (1/s)",
     )
     spread: float = bounded(
         2.0,
         low=0.0,
         high=100.0,
-        doc="Speed along the outline of a robot that is behind the object but not in contact, "
-        "divided by its distance from the middle between its neighbours (1/s)",
+        doc="Speed at which a robot behind the object, but not in contact, moves along the "
+        "outline of the object, divided by its distance from the middle between its neighbours "
+        "(1/s)",
     )
     turn: float = bounded(
         0.3,
@@ -99,16 +100,16 @@ class LocalLawSettings:
         0.6,
         low=0.0,
         high=10.0,
-        doc="The same as 'turn', on a map with walls, where an object that turns too slowly gets "
-        "to a wall beside its route (rad/s)",
+        doc="Value of 'turn' on a map with walls (rad/s). It is greater, because an object that "
+        "turns too slowly comes to a wall beside its route",
     )
     drift: float = bounded(
         4.0,
         low=0.0,
         high=100.0,
-        doc="A robot slows down if the side under its push makes the object drift sideways. This "
-        "is the fraction by which it slows down, divided by the drift speed as a fraction of the "
-        "robot's maximum speed and by the sideways part of the side's normal (dimensionless)",
+        doc="Fraction by which a robot slows down if its push makes the object drift sideways, "
+        "divided by the drift speed (as a fraction of the robot's maximum speed) and by the "
+        "sideways component of the inward normal of the pushed side (dimensionless)",
     )
     memory: float = bounded(
         0.5,

@@ -28,7 +28,8 @@ class RouteSettings:
         low=0.0,
         high=10.0,
         doc="Preferred clearance of the object from walls on its route, in addition to the "
-        "diameter of a robot (m). If there is no such route, the widest one is taken",
+        "diameter of a robot (m). If there is no such route, the one with the greatest clearance "
+        "is taken",
     )
     ahead: float = bounded(
         0.4,
@@ -41,8 +42,8 @@ class RouteSettings:
         1.0,
         low=0.0,
         high=10.0,
-        doc="Distance by which the point towards which the object is pushed is moved to the other "
-        "side of the route, divided by the distance of the object from the route (dimensionless)",
+        doc="Shift of the point towards which the object is pushed, to the other side of the "
+        "route, divided by the distance of the object from the route (dimensionless)",
     )
 
 

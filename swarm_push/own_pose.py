@@ -24,24 +24,32 @@ class OwnPoseSettings:
     """What a robot assumes of the errors of its sensor; all are standard deviations."""
 
     start_position: float = bounded(
-        0.01, low=0.0, high=1.0, doc="Error of the position that a robot is told at the start (m)"
+        0.01,
+        low=0.0,
+        high=1.0,
+        doc="Standard deviation of the error of the position that a robot is told at the start (m)",
     )
     start_heading: float = bounded(
-        0.02, low=0.0, high=1.0, doc="Error of the heading that a robot is told at the start (rad)"
+        0.02,
+        low=0.0,
+        high=1.0,
+        doc="Standard deviation of the error of the heading that a robot "
+        "is told at the start (rad)",
     )
     gate: float = bounded(
         0.1,
         low=0.01,
         high=10.0,
-        doc="A scanned point that is farther than this from all sides of walls is not used (m)",
+        doc="Distance from all sides of walls on the map above which a scanned point is not used "
+        "for the pose estimate of a robot (m)",
     )
     scan_error: float = bounded(
         0.02,
         low=1e-3,
         high=1.0,
-        doc="Standard deviation that a robot assumes of the distance of a scanned point from its "
-        "wall. It is larger than that of the sensor, because points are not independent if they "
-        "lie on the same wall (m)",
+        doc="Standard deviation of the distance of a scanned point from its wall that the pose "
+        "estimate of a robot assumes (m). It is greater than that of the sensor, because the "
+        "errors of points on the same wall are not independent",
     )
 
 
