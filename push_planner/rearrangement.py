@@ -6,7 +6,7 @@ move brings one object to its goal or, out of the way, to another place.
 
 The search goes through the moves in depth. At each step it plans pushes for the objects that are
 not at their goals, cheapest estimate first, among all the others as they stand then; the first one
-with a plan is moved. If none has a plan, an object that bars the way of another one is moved aside,
+with a plan is moved. If none has a plan, an object in the way of another one is moved aside,
 to the nearest place from which it blocks neither that way nor a goal. If that fails too, the search
 goes back and tries the next object of the step before. A move is only taken if the pushes are
 planned (``PushPlanner``, the first plan; a plan for execution is made when the move begins).

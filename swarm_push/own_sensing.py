@@ -1,7 +1,8 @@
 """A swarm without shared poses: each robot has only its own sensing (``robot_sensor.py``), and its
-own copy of one law (``local_law.py``). No robot is told the outline of the object, or a pose.
+own copy of one law (``local_law.py``). No robot is told the outline of the object. In an open room
+no robot is told a pose either.
 
-In a room with walls in it each robot has a map (``map_guide.py``). It is told where it stands at
+In a room with inner walls each robot has a map (``map_guide.py``). It is told where it stands at
 the start, where the object starts, where it is to go, and the radii of two discs about its centre:
 one contains the object, the other one lies in it.
 
