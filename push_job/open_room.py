@@ -183,6 +183,7 @@ class OpenRoomMethod:
                 self.end(JobError.NONE, f"at the goal: {1e3 * away:.0f} mm")
                 return Told()
             self._aim(belief)
+            away, _ = self.errors(seen)
         origin = np.array([*self._middle, 0.0])
         pose = self._item.mass_pose(seen.object) - origin
         left = self._law.left(pose) if isinstance(self._law, WalledLaw) else away

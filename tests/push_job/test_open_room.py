@@ -110,3 +110,13 @@ def test_no_progress_fails_the_task():
         assert method.status.phase == JobPhase.PUSHING
         told = method.step(seen(time), belief)
     assert method.status.code == JobError.EXECUTION_FAILED and not told.commands
+
+
+def test_progress_to_a_further_target_is_measured_from_that_target():
+    """The small distance from the target that was just reached once counted as the best so far."""
+    method, belief, _ = hosted()
+    method.begin(Task((NEAR, FAR)), belief)
+    limit = OpenRoomSettings().stalled
+    for k, x in enumerate((0.0, 0.25, 0.4, 0.6, 0.8)):
+        told = method.step(seen(0.5 * limit * k, (x, 0.0, 0.0)), belief)
+        assert method.status.phase == JobPhase.PUSHING and told.commands, (x, method.status)
