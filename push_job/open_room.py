@@ -2,7 +2,8 @@
 
 The rivals of the studies and the swarm with own sensing are such laws. Each is a file that says how
 robots move; the rest is the same for all. A law that leads the object round walls says how long the
-way is that is left (``WalledLaw``), because the object may have to go away from its target first.
+way is that is left (``WalledLaw``), because the object may have to go away from its target first. A
+law whose robots have memories of their own is told which robots it moves (``NamedLaw``).
 """
 
 import math
@@ -84,6 +85,15 @@ class WalledLaw(Protocol):
     def left(self, pose: Array) -> float:
         """[m] of way that an object with its centre of mass at ``(3,)`` has to its target; inf if
         it is not known yet."""
+        ...
+
+
+@runtime_checkable
+class NamedLaw(Protocol):
+    """A law that remembers something of each robot, also while it is not seen."""
+
+    def meet(self, names: tuple[str, ...]) -> None:
+        """Names of the robots of the calls of ``velocities`` that follow, in their order."""
         ...
 
 
@@ -196,6 +206,8 @@ class OpenRoomMethod:
         waits = 1e-9 < self._next - seen.time < _STEP + 1e-9  # else time has jumped back
         if not waits or names != self._names:
             self._next, self._names = seen.time + _STEP, names
+            if isinstance(self._law, NamedLaw):
+                self._law.meet(names)
             try:
                 chosen = self._law.velocities(seen.time, pose, robots - origin)
             except NoWay as problem:

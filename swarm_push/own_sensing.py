@@ -11,6 +11,7 @@ tells the host, and when the task is done, comes from them too. The robots' laws
 """
 
 import math
+from collections.abc import Hashable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -47,8 +48,10 @@ class OwnSensing:
         outline = room.item.geometry.outline
         walls = None if guides is None else guides.sides
         self._sensor = RobotSensor(outline, room.size, sensor, room.seed, walls)
-        self._robots: list[LocalLaw] = []
-        self._last: float | None = None
+        self._names: tuple[str, ...] = ()
+        self._robots: dict[Hashable, LocalLaw] = {}  # by name
+        self._last: dict[Hashable, float] = {}  # [s] of the last reading, by name
+        self._errors = np.random.default_rng([room.seed, 8])  # of what robots are told
         self._route: MapRoute | None = None
 
     def left(self, pose: Array) -> float:
@@ -57,29 +60,37 @@ class OwnSensing:
             return math.hypot(*(pose[:2] - self._room.target))
         return math.inf if self._route is None else self._route.left(pose[:2])
 
+    def meet(self, names: tuple[str, ...]) -> None:
+        """See NamedLaw."""
+        self._names = names
+
     def velocities(self, time: float, pose: Array, robots: Array) -> Array:
         """See VelocityLaw."""
-        if len(self._robots) != len(robots):
-            self._begin(pose, robots)
-        dt, self._last = 0.0 if self._last is None else time - self._last, time
-        readings = self._sensor.look(pose, robots, self._room.target)
-        told = [r.step(v, dt) for r, v in zip(self._robots, readings, strict=True)]
+        names: Sequence[Hashable] = self._names or range(len(robots))
+        for name, robot in zip(names, robots, strict=True):
+            if name not in self._robots:
+                self._robots[name] = self._made(pose, robot)
+        readings = self._sensor.look(pose, robots, self._room.target, names)
+        told = [
+            self._robots[name].step(reading, time - self._last.get(name, time))
+            for name, reading in zip(names, readings, strict=True)
+        ]
+        self._last.update(dict.fromkeys(names, time))
         own = np.array(told).reshape(-1, 2)
         c, s = np.cos(robots[:, 2]), np.sin(robots[:, 2])
         return np.column_stack([c * own[:, 0] - s * own[:, 1], s * own[:, 0] + c * own[:, 1]])
 
-    def _begin(self, pose: Array, robots: Array) -> None:
+    def _made(self, pose: Array, robot: Array) -> LocalLaw:
+        """That of a robot at ``(3,)``, which is told what it has to know; once for a target."""
         room, guides = self._room, self._guides
-        guided: list[MapGuide | None] = [None] * len(robots)
-        discs = None
+        guide, discs = None, None
         if guides is not None:
             discs = _discs(room.item.geometry.outline)
-            self._route = guides.route(room.item, pose[:2], room.target)
-            guided = [*guides.made(room, self._route, robots)]
-        self._robots = [
-            LocalLaw(room.radius, room.speed, self._law, (room.seed, 9, i), guide, discs)
-            for i, guide in enumerate(guided)
-        ]
+            if self._route is None:
+                self._route = guides.route(room.item, pose[:2], room.target)
+            guide = guides.made(self._route, robot, self._errors)
+        seed = room.seed, 9, len(self._robots)
+        return LocalLaw(room.radius, room.speed, self._law, seed, guide, discs)
 
 
 class Guides:
@@ -103,16 +114,13 @@ class Guides:
         _, radius = _discs(item.geometry.outline)
         return MapRoute(self._space, start, target, (radius, self._radius), self._settings)
 
-    def made(self, room: OpenRoom, route: MapRoute, robots: Array) -> list[MapGuide]:
-        """robots ``(n, 3)``: poses at the start, of which each is told its own, with errors."""
+    def made(self, route: MapRoute, robot: Array, errors: np.random.Generator) -> MapGuide:
+        """robot ``(3,)``: its pose at the start, which it is told with errors."""
         s = self._own
         deviations = np.array([s.start_position, s.start_position, s.start_heading])
-        errors = np.random.default_rng([room.seed, 8]).normal(size=(len(robots), 3)) * deviations
-        slip = self._sensor.odometry_error
-        return [
-            MapGuide(self._space, route, OwnPose(self.sides, place, slip, s), self._radius)
-            for place in robots + errors
-        ]
+        told = robot + errors.normal(size=3) * deviations
+        own = OwnPose(self.sides, told, self._sensor.odometry_error, s)
+        return MapGuide(self._space, route, own, self._radius)
 
 
 def _discs(outline: Array) -> tuple[float, float]:

@@ -10,6 +10,7 @@ they hide the object and robots that are behind them; nor is a wall seen behind 
 """
 
 import math
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -65,7 +66,7 @@ class Reading:
     object is out of range. robots ``(m, 2)`` [m]: centres of those that are seen. walls ``(w, 2)``
     [m]: the nearest point of each wall that is near; with walls in the room all points of the scan
     that lie on walls. target ``(2,)`` [m]; nan where there is no beacon. moved ``(3,)`` [m, m,
-    rad]: the pose of the robot in its frame at the reading before.
+    rad]: the pose of the robot in its frame at its reading before.
     """
 
     object: Array
@@ -93,16 +94,17 @@ class RobotSensor:
         self._settings, self._random = settings, np.random.default_rng([seed, 7])
         angles = 2.0 * math.pi * np.arange(settings.rays) / settings.rays
         self._rays = np.column_stack([np.cos(angles), np.sin(angles)])
-        self._before: Array | None = None
+        self._before: dict[Hashable, Array] = {}  # poses at the last reading, by name
         self._walls = walls
 
-    def look(self, pose: Array, robots: Array, target: Array) -> list[Reading]:
+    def look(
+        self, pose: Array, robots: Array, target: Array, names: Sequence[Hashable] = ()
+    ) -> list[Reading]:
         """One reading of each robot. pose ``(3,)`` of the object's centre of mass; robots
-        ``(n, 3)``; target ``(2,)`` [m]."""
-        before = robots if self._before is None else self._before
-        if len(before) != len(robots):
-            before = robots
-        self._before = robots.copy()
+        ``(n, 3)``; target ``(2,)`` [m]; names: of the robots, their numbers if none are given."""
+        names = names or range(len(robots))
+        before = [self._before.get(n, r) for n, r in zip(names, robots, strict=True)]
+        self._before.update(zip(names, robots.copy(), strict=True))
         sides = _sides(se2.transform(pose, self._outline))
         places = np.ascontiguousarray(robots[:, :2])
         headings, most = robots[:, 2].copy(), self._settings.range

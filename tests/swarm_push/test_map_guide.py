@@ -23,7 +23,7 @@ from swarm_push.local_law import LocalLawSettings, _between, seen_centre
 from swarm_push.map_guide import MapGuide
 from swarm_push.map_route import MapRoute, RouteSettings
 from swarm_push.own_pose import OwnPose, OwnPoseSettings
-from swarm_push.own_sensing import METHOD, _discs
+from swarm_push.own_sensing import METHOD, Guides, _discs
 from swarm_push.robot_sensor import RobotSensor, RobotSensorSettings
 from swarm_push.wall_sides import wall_sides
 from swarm_push.walls import Walls
@@ -264,6 +264,31 @@ def test_a_target_to_which_the_object_does_not_fit_is_refused():
     method.step(Seen(0.0, start, {"e0": np.array([1.0, 1.0, 0.0])}), belief)
     assert method.status.phase == JobPhase.IDLE
     assert method.status.code == JobError.PLANNING_FAILED, method.status
+
+
+def test_a_robot_is_told_its_pose_once(monkeypatch):
+    """Also if motion capture loses robots, or loses one and finds another one in the same frame.
+    What a robot has measured until then counts: its odometry goes on from its last reading."""
+    told, made_guide = [], Guides.made
+    monkeypatch.setattr(
+        Guides, "made", lambda *args: told.append(args[2]) or made_guide(*args), raising=True
+    )
+    method, belief = made("transport_middle", count=3)
+    method.begin(Task((np.array([0.0, 1.0, math.nan]),)), belief)
+    places = {f"e{i}": np.array([0.3 * i - 0.3, -1.3, 0.1 * i]) for i in range(3)}
+    for tick, names in enumerate(("e0 e1", "e0 e1", "e0 e2", "e0", "e0 e1 e2", "e1 e2")):
+        robots = {n: places[n] + [0.002 * tick, 0.0, 0.03 * tick] for n in names.split()}
+        assert method.step(Seen(0.02 * tick, np.array([0.0, -1.0, 0.0]), robots), belief).commands
+    assert np.allclose(told, [places["e0"], places["e1"], places["e2"] + [0.004, 0.0, 0.06]])
+
+
+def test_odometry_goes_on_while_motion_capture_does_not_see_a_robot():
+    look, robots = RobotSensor(SQUARE.geometry.outline, (3.0, 3.0), EXACT, 1), np.zeros((2, 3))
+    look.look(FAR, robots, np.ones(2), ("a", "b"))
+    look.look(FAR, robots[:1], np.ones(2), ("a",))
+    moved = np.array([[0.1, 0.2, 0.3], [0.0, 0.0, 0.0]])
+    one, other = look.look(FAR, moved, np.ones(2), ("b", "a"))
+    assert np.allclose(one.moved, moved[0]) and np.allclose(other.moved, 0.0)
 
 
 def test_what_a_robot_does_not_see_does_not_change_its_reading():
