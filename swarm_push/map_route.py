@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from push_job.open_room import NoWay
-from push_model.arrays import Array
+from push_model.arrays import Array, Mask
 from push_model.free_space import FreeSpace
 from push_model.settings import bounded, settings
 
@@ -82,8 +82,18 @@ class MapRoute:
         raise NoWay(f"an object in a disc of {self.radius:.3g} m has no way to the target")
 
     def place(self, point: Array) -> int:
-        """Number of the point of the route that is nearest to a point ``(2,)`` [m]."""
-        return int(np.hypot(*(self.points - point).T).argmin())
+        """Number of the point of the route that is nearest to a point ``(2,)`` [m] and not behind a
+        wall, for a route may come back on the other side of one. The nearest if all are behind."""
+        away = np.hypot(*(self.points - point).T)
+        nearest = int(away.argmin())
+        if not self._in_sight(point, self.points[nearest : nearest + 1])[0]:
+            sees = self._in_sight(point, self.points)
+            nearest = int(np.where(sees, away, away + away.max()).argmin())
+        return nearest
+
+    def _in_sight(self, point: Array, others: Array) -> Mask:
+        """To which points ``(n, 2)`` [m] no wall is in the way."""
+        return self._space.sees(np.repeat(point[None], len(others), axis=0), others, _LEAST, 0.0)
 
     def direction(self, point: Array) -> Array:
         """Unit vector ``(2,)`` along the route beside a point ``(2,)`` [m]; zero at its end."""
@@ -100,7 +110,8 @@ class MapRoute:
 
     def aim(self, point: Array) -> Array:
         """``(2,)`` [m] to which an object at ``(2,)`` is pushed: the farthest point within the
-        look-ahead that it sees; the point that is nearest if it sees none."""
+        look-ahead to which the disc can go straight, the one after the nearest if it can go to
+        none; moved to the other side of the route, except at the ends of it."""
         here = self.place(point)
         count = max(1, round(self._settings.ahead / max(self._spacing, 1e-9)))
         ahead = self.points[here : here + count + 1]

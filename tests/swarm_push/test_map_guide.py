@@ -16,6 +16,7 @@ from push_model.free_space import FreeSpace
 from push_model.jobs import JobError, JobPhase
 from push_model.occupancy import OccupancyGrid, rasterise
 from push_model.outlines import distance
+from push_model.specs import BoxSpec, EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
 from push_study.swarm.maps import MAPS, drawn, load_map
 from sim_bridge.planar_world import PlanarWorld
@@ -159,6 +160,21 @@ def test_an_object_beside_its_route_is_led_back_to_it():
     for x, y in np.random.default_rng(1).uniform([-0.8, -0.4], [0.4, 0.4], (100, 2)):
         aim = straight.aim(np.array([x, y]))
         assert aim[0] == pytest.approx(x + 0.4, abs=0.06) and aim[1] == pytest.approx(-y, abs=1e-9)
+
+
+def test_an_object_is_led_along_its_side_of_a_thin_wall():
+    """The route goes round the end of a wall and comes back close behind it. 200 places of an
+    object before the wall: also those to which the way behind it is nearer."""
+    environment = EnvironmentSpec((4.0, 4.0), (BoxSpec((1.0, -0.5), (0.05, 3.0)),), resolution=0.05)
+    space, nearer = FreeSpace(rasterise(environment)), 0
+    start, target = np.array([-1.0, -1.5]), np.array([1.5, -1.5])
+    found = MapRoute(space, start, target, (0.2, RADIUS), RouteSettings())
+    top = int(np.hypot(*(found.points - [1.0, 1.0]).T).argmin())
+    for item in np.random.default_rng(1).uniform([0.3, -1.7], [0.75, -0.2], (200, 2)):
+        nearer += int(np.hypot(*(found.points - item).T).argmin()) > top
+        assert found.place(item) <= top and found.aim(item)[0] < item[0]
+        assert found.left(item) > 0.5 * found.length
+    assert nearer > 20
 
 
 @lru_cache
