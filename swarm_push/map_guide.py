@@ -122,11 +122,13 @@ class MapGuide:
         return found
 
     def _expect(self) -> None:
-        """Look farther along the route if the object is not where it was."""
-        here = self.own.pose[:2]
+        """Look farther along the route if the object is not where it was. It was not in a wall:
+        if its estimated centre is, look for it on the route."""
+        here, points = self.own.pose[:2], self._route.points
+        if self._space.clearance(self._item[None])[0] < self._radius:
+            self._item = points[self._route.place(self._item)]
         if math.hypot(*(self._item - here)) > _EMPTY or not self._sees(here, self._item):
             return
-        points = self._route.points
         at = self._route.place(self._item)
         step = max(1, round(_ON * (len(points) - 1) / max(self._route.length, 1e-9)))
         self._item = points[(at + step) % len(points)]

@@ -234,6 +234,22 @@ def test_a_robot_walks_round_walls_to_the_object_and_then_along_its_route():
         assert np.hypot(*(np.array(met) - place).T).min() < 0.5
 
 
+def test_a_robot_that_has_seen_the_object_in_a_wall_looks_for_it_on_the_route():
+    """An estimate of the centre may be wrong by so much. It stood before that wall for ever."""
+    name = "transport_two_corners"
+    for wall in ((-0.5, -0.4), (1.55, 0.0), (0.0, 0.4)):
+        here, met = np.array([-1.0, -1.0]), []
+        one = guide(name, [*here, 0.0])
+        one.target(np.array(wall) - here)
+        for _ in range(1500):
+            one.own.pose[:2] = here
+            way = one.walk()
+            step = here + 0.02 * way / max(float(np.hypot(*way)), 0.02)
+            here = step if SPACES[name].clearance(step[None])[0] > 0.5 * RADIUS else here
+            met.append(here)
+        assert np.hypot(*(np.array(met) - MAPS[name][1]).T).min() < 0.5
+
+
 @pytest.mark.parametrize("name", ["circle", "square", "rectangle"])
 def test_what_is_told_of_the_size_of_an_object_corrects_its_centre(name):
     """200 places: with both radii the centre is closer than without, for a circle, of which a near
