@@ -19,7 +19,7 @@ from push_model.obstacles import NOTHING
 from swarm_push.map_route import MapRoute
 from swarm_push.own_pose import OwnPose
 from swarm_push.robot_sensor import Reading
-from swarm_push.walls import farthest_seen
+from swarm_push.walls import farthest_seen, towards_walls
 
 _SPARE = 0.02  # [m] that a robot's way keeps from walls beside its radius
 _EMPTY = 0.4  # [m] from a place: a robot that does not see the object there knows that it has gone
@@ -27,7 +27,6 @@ _ON = 0.3  # [m] along the route to where it looks next
 _MOVED = 0.1  # [m] that a place moves before the way to it is looked for again
 # Chosen on the four maps of ``swarm-maps``, with seeds 501 to 505, 901 to 906 and 1101.
 _PINS = 0.2  # cosine of the angle between a wall's normal and a push that is always allowed
-_STEP = 0.01  # [m] of the differences that give the direction of the nearest wall
 _MARGIN = 0.03  # [m] between the object and a wall that pushes at the wall leave
 _ALONG = 0.6  # weight of the direction of the route where the object cannot go straight to it
 _OPEN, _FRONT = 1.0, 0.4  # weight of room before it there; [m] from it where this is looked for
@@ -65,8 +64,9 @@ class MapGuide:
         return self._seen_from_here(self._item + self._ahead)
 
     def _from_walls(self, aim: Array) -> Array:
-        """``(2,)`` [m] from the object to a point, turned as little as is needed for robots to have
-        room behind the object; not turned if there is no room anywhere."""
+        """``(2,)`` [m] from the object to a point. If robots have no room behind the object, it is
+        turned to where they have some: little, along the route and into open space as far as may
+        be. It is not turned if there is no room anywhere."""
         way = aim - self._item
         away = self._route.radius + self._radius
         turned = _TURNS @ way
@@ -83,12 +83,10 @@ class MapGuide:
     def _beside(self) -> tuple[float, Array]:
         """Cosine that a push may have at most with the unit vector ``(2,)`` from the object to the
         nearest wall: the smaller, the closer the wall is."""
-        room = float(self._space.clearance(self._item[None])[0]) - self._route.radius
+        here = self._item[None]
+        room = float(self._space.clearance(here)[0]) - self._route.radius
         most = max(_PINS, (room - _MARGIN) / (2.0 * self._radius))
-        beside = self._item + _STEP * np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
-        east, west, north, south = self._space.clearance(beside)
-        wall = np.array([west - east, south - north])
-        return most, wall / max(math.hypot(*wall), 1e-9)
+        return most, towards_walls(self._space, here)[0]
 
     def pins(self, inward: Array) -> bool:
         """See Guide."""

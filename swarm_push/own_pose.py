@@ -15,8 +15,10 @@ from push_model import se2
 from push_model.arrays import Array
 from push_model.settings import bounded, settings
 
-_LEAST_SLIP = 2e-4  # [m], [rad] of the odometry of one step, whatever its length
-_TURN_FLOOR = 5e-4  # [rad] likewise
+# Standard deviations of the odometry of a robot that stands, one step: they keep the filter open
+# to the scan after a long rest.
+_LEAST_SLIP = 2e-4  # [m]
+_LEAST_TURN = 5e-4  # [rad]
 
 
 @settings
@@ -87,10 +89,29 @@ def _predict(pose: Any, covariance: Any, moved: Any, slip: float) -> None:
     covariance[:] = turn @ covariance @ turn.T
     covariance[0, 0] += along * along
     covariance[1, 1] += along * along
-    covariance[2, 2] += (_TURN_FLOOR + slip * abs(moved[2])) ** 2
+    covariance[2, 2] += (_LEAST_TURN + slip * abs(moved[2])) ** 2
     pose[0] += dx
     pose[1] += dy
     pose[2] += moved[2]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _facing(pose: Any, sides: Any, most: float) -> Any:
+    """``(m, 5)``: start, direction and length of the sides that face a robot and come closer to it
+    than ``most`` [m]."""
+    found = np.empty((sides.shape[0], 5))
+    count = 0
+    for j in range(sides.shape[0]):
+        ax, ay = sides[j, 0, 0], sides[j, 0, 1]
+        ex, ey = sides[j, 1, 0] - ax, sides[j, 1, 1] - ay
+        length = math.hypot(ex, ey)
+        ex, ey = ex / length, ey / length
+        x, y = pose[0] - ax, pose[1] - ay
+        along, across = x * ex + y * ey, ex * y - ey * x
+        if across > 0.0 and math.hypot(across, max(0.0, -along, along - length)) < most:
+            found[count] = ax, ay, ex, ey, length
+            count += 1
+    return found[:count]
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -99,17 +120,17 @@ def _correct(pose: Any, covariance: Any, sides: Any, scan: Any, gate: float, err
     information, pull = np.linalg.inv(covariance), np.zeros(3)
     c, s = math.cos(pose[2]), math.sin(pose[2])
     h = np.empty(3)
+    weight = 1.0 / (error * error)
+    reach = 0.0
+    for k in range(scan.shape[0]):
+        reach = max(reach, math.hypot(scan[k, 0], scan[k, 1]))
+    near = _facing(pose, sides, reach + gate + 1e-9)
     for k in range(scan.shape[0]):
         rx, ry = c * scan[k, 0] - s * scan[k, 1], s * scan[k, 0] + c * scan[k, 1]
         x, y = pose[0] + rx, pose[1] + ry
         best, off, nx, ny = gate, 0.0, 0.0, 0.0
-        for j in range(sides.shape[0]):
-            ax, ay = sides[j, 0, 0], sides[j, 0, 1]
-            ex, ey = sides[j, 1, 0] - ax, sides[j, 1, 1] - ay
-            length = math.hypot(ex, ey)
-            ex, ey = ex / length, ey / length
-            if ex * (pose[1] - ay) - ey * (pose[0] - ax) <= 0.0:
-                continue  # it faces away from the robot
+        for j in range(near.shape[0]):
+            ax, ay, ex, ey, length = near[j]
             along = (x - ax) * ex + (y - ay) * ey
             across = ex * (y - ay) - ey * (x - ax)
             beyond = max(0.0, -along, along - length)
@@ -119,7 +140,6 @@ def _correct(pose: Any, covariance: Any, sides: Any, scan: Any, gate: float, err
         if best >= gate:
             continue
         h[0], h[1], h[2] = nx, ny, nx * -ry + ny * rx
-        weight = 1.0 / (error * error)
         for a in range(3):
             pull[a] -= weight * h[a] * off
             for b in range(3):

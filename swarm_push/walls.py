@@ -83,17 +83,8 @@ class Walls:
         return np.column_stack([unit, most])
 
     def towards(self, points: Array) -> Array:
-        """Unit vectors ``(n, 2)`` from points ``(n, 2)`` [m] towards the nearest wall.
-
-        Zero where two walls are equally near.
-        """
-        around = points + _STEP * np.array([[[1.0, 0.0]], [[-1, 0]], [[0, 1]], [[0, -1]]])
-        east, west, north, south = self.space.clearance(around.reshape(-1, 2)).reshape(4, -1)
-        away = np.column_stack([west - east, south - north])
-        length = np.hypot(*away.T)
-        part = np.where(length > 1e-6, 1.0, 0.0) / np.maximum(length, 1e-9)
-        unit: Array = part[:, None] * away
-        return unit
+        """See ``towards_walls``."""
+        return towards_walls(self.space, points)
 
     def round_corners(
         self, robots: Array, aims: Array, length: Array, item: Array
@@ -156,6 +147,20 @@ class Walls:
         if self._ways is None or ways.done or _are_reached(ways.state, ways.stride, here):
             self._ways, self._newer = ways, None
         return self._ways
+
+
+def towards_walls(space: FreeSpace, points: Array) -> Array:
+    """Unit vectors ``(n, 2)`` from points ``(n, 2)`` [m] towards the nearest wall.
+
+    Zero where two walls are equally near.
+    """
+    around = points + _STEP * np.array([[[1.0, 0.0]], [[-1, 0]], [[0, 1]], [[0, -1]]])
+    east, west, north, south = space.clearance(around.reshape(-1, 2)).reshape(4, -1)
+    away = np.column_stack([west - east, south - north])
+    length = np.hypot(*away.T)
+    part = np.where(length > 1e-6, 1.0, 0.0) / np.maximum(length, 1e-9)
+    unit: Array = part[:, None] * away
+    return unit
 
 
 @numba.njit(cache=True)

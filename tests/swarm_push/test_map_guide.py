@@ -90,46 +90,6 @@ def test_walls_are_scanned_and_hide_what_is_behind_them():
     assert hidden > 50
 
 
-@pytest.mark.parametrize(
-    ("factor", "most", "turned"),
-    [(1.0, 0.03, 0.03), pytest.param(3.0, 0.06, 0.06, marks=pytest.mark.long)],
-)
-def test_a_robot_keeps_its_place_on_the_map(factor, most, turned):
-    """200 robots walk 40 steps of 4 cm and turn: with errors at the start and of the sensor, and
-    with three times these."""
-    s = OwnPoseSettings()
-    noisy = RobotSensorSettings()
-    noisy = replace(
-        noisy,
-        distance_error=factor * noisy.distance_error,
-        least_error=factor * noisy.least_error,
-        odometry_error=factor * noisy.odometry_error,
-    )
-    worst = np.zeros(2)
-    for seed in range(5):
-        name = list(MAPS)[seed % 4]
-        _, robots = scene(name, seed, 40)
-        random = np.random.default_rng(seed)
-        sides = SIDES[name]
-        look = RobotSensor(SQUARE.geometry.outline, (3.0, 3.0), noisy, seed, sides)
-        deviations = factor * np.array([s.start_position, s.start_position, s.start_heading])
-        told = robots + random.normal(size=robots.shape) * deviations
-        own = [OwnPose(sides, place, noisy.odometry_error, s) for place in told]
-        for _ in range(40):
-            walked = np.array([se2.compose(r, np.array([0.04, 0.0, 0.0])) for r in robots])
-            free = SPACES[name].clearance(walked[:, :2]) > RADIUS
-            walked[~free] = robots[~free]
-            walked[:, 2] += random.normal(size=len(robots)) * 0.2
-            robots = walked
-            for pose, reading in zip(own, look.look(FAR, robots, np.ones(2)), strict=True):
-                pose.step(reading.moved, reading.walls)
-        off = np.array([p.pose for p in own]) - robots
-        worst = np.maximum(
-            worst, [np.hypot(*off[:, :2].T).max(), np.abs(se2.wrap(off[:, 2])).max()]
-        )
-    assert worst[0] < most and worst[1] < turned, worst
-
-
 def route(name, start, target, radius=0.25, **settings):
     radii = radius, RADIUS
     return MapRoute(
