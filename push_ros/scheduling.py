@@ -5,8 +5,8 @@ a process that computes, for example a browser or a planner, may finish its time
 milliseconds before a node that has received poses runs.
 
 A node with a real-time priority must not keep other processes from running. If it computes for
-``LONGEST`` without waiting, the priority is suspended for ``PAUSE``. Processes that the node starts
-do not inherit the priority.
+``LONGEST`` without waiting, the priority is suspended for ``PAUSE``, as soon as compiled code that
+runs then returns. Processes that the node starts do not inherit the priority.
 """
 
 import contextlib
@@ -37,7 +37,7 @@ _SUSPENDED = f"computed for {LONGEST:g} s without waiting; its real-time priorit
 
 
 class Urgency(Enum):
-    """How soon a node must run. The value is its real-time priority (1 to 99), 0 for none.
+    """How soon a node must run. The value is its real-time priority (1 to 99); not positive: none.
 
     WORLD: it measures and moves robots, and stops them when no command comes. CONTROL: it answers
     poses with commands. BACKGROUND: it plans, records or shows, and gives way to other processes.
@@ -79,10 +79,8 @@ class RealTimePriority:
             return
         limits = resource.getrlimit(resource.RLIMIT_RTTIME)
         self._before = signal.signal(signal.SIGXCPU, self._suspend), limits
-        with contextlib.suppress(ValueError):  # the limit of the system is lower
-            resource.setrlimit(resource.RLIMIT_RTTIME, (round(1e6 * LONGEST), limits[1]))
         try:
-            _schedule(os.SCHED_RR, self._priority)
+            self._take()
         except OSError as error:
             self.refusal = _REFUSED.format(error=error.strerror)
             self.close()
@@ -96,9 +94,19 @@ class RealTimePriority:
         """
         if self._due is not None and time.monotonic() >= self._due:
             with contextlib.suppress(OSError):
-                _schedule(os.SCHED_RR, self._priority)
+                self._take()
                 self.held = True
             self._due = time.monotonic() + EVERY
+
+    def _take(self) -> None:
+        """With the limit, which the kernel raises by 1 s each time that it sends the signal. It
+        kills the process at the hard limit, so where the system sets one, half of it is taken."""
+        _, hard = resource.getrlimit(resource.RLIMIT_RTTIME)
+        soft = round(1e6 * LONGEST)  # [us]
+        if hard != resource.RLIM_INFINITY:
+            soft = min(soft, hard // 2)
+        resource.setrlimit(resource.RLIMIT_RTTIME, (soft, hard))
+        _schedule(os.SCHED_RR, self._priority)
 
     def close(self) -> None:
         """Give the priority back."""

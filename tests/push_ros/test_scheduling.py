@@ -108,6 +108,33 @@ def test_the_kernel_sends_the_signal_to_who_computes_without_waiting():
     priority.close()
 
 
+def test_the_limit_of_computation_stays_the_same(scheduled, monkeypatch):
+    """The kernel raises it by 1 s with each signal; it was 1.2 s, 2.2 s and so on afterwards."""
+    now = [100.0]
+    monkeypatch.setattr(scheduling.time, "monotonic", lambda: now[0])
+    _, hard = resource.getrlimit(resource.RLIMIT_RTTIME)
+    priority = RealTimePriority(Urgency.WORLD, str)
+    for _ in range(2):
+        resource.setrlimit(resource.RLIMIT_RTTIME, (1_200_000, hard))
+        os.kill(os.getpid(), signal.SIGXCPU)
+        assert not priority.held
+        now[0] += PAUSE + 0.1
+        priority.look()
+        assert priority.held and resource.getrlimit(resource.RLIMIT_RTTIME)[0] == 200_000
+    priority.close()
+
+
+def test_the_signal_comes_before_the_hard_limit_of_the_system(scheduled, monkeypatch):
+    """At the hard limit the kernel kills the process."""
+    limits = [(150_000, 150_000)]
+    monkeypatch.setattr(resource, "getrlimit", lambda _: limits[-1])
+    monkeypatch.setattr(resource, "setrlimit", lambda _, pair: limits.append(pair))
+    priority = RealTimePriority(Urgency.WORLD, print)
+    assert priority.held and limits[-1] == (75_000, 150_000)
+    priority.close()
+    assert limits[-1] == limits[0]
+
+
 def test_a_system_that_refuses_is_no_error(monkeypatch):
     def refuse(*_):
         raise PermissionError(1, "Operation not permitted")
