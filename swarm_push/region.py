@@ -9,8 +9,10 @@ from push_model.occupancy import OccupancyGrid
 def is_open(grid: OccupancyGrid) -> bool:
     """Whether the free cells of a map fill a rectangle."""
     free = ~grid.occupied
-    inner = free[free.any(axis=1)][:, free.any(axis=0)]
-    return bool(inner.size and inner.all())
+    rows, columns = np.flatnonzero(free.any(axis=1)), np.flatnonzero(free.any(axis=0))
+    if not len(rows):
+        return False
+    return bool(free[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1].all())
 
 
 def covered_region(grid: OccupancyGrid, margin: float) -> Array | None:

@@ -258,6 +258,16 @@ def test_a_target_to_which_the_object_does_not_fit_is_refused():
     assert method.status.code == JobError.PLANNING_FAILED, method.status
 
 
+def test_a_target_behind_a_wall_right_across_the_room_is_refused():
+    """The room once counted as open: two rectangles of free cells, one beside the other."""
+    room = EnvironmentSpec((3.0, 3.0), (BoxSpec((0.0, 0.0), (0.1, 3.0)),), resolution=0.05)
+    arena = Arena(rasterise(room), {"e0": ROBOT}, "object", SQUARE)
+    belief = Belief({"object": SQUARE}, {"e0": ROBOT})
+    seen, task = Seen(0.0, np.array([-0.8, 0.0, 0.0]), {}), Task((np.array([0.8, 0.0, math.nan]),))
+    answer = METHOD.make(arena).assess(task, belief, seen)
+    assert isinstance(answer, Refusal) and answer.code is JobError.PLANNING_FAILED
+
+
 def test_a_robot_is_told_its_pose_once(monkeypatch):
     """Also if motion capture loses robots, or loses one and finds another one in the same frame.
     What a robot has measured until then counts: its odometry goes on from its last reading."""

@@ -221,6 +221,8 @@ def test_the_region_is_the_rectangle_about_free_cells():
     assert covered_region(grid, 1.0) is None
     occupied[20, 30] = True
     assert not is_open(grid) and np.array_equal(covered_region(grid, 0.05), corners)
+    occupied[20] = True  # a wall right across
+    assert not is_open(grid) and np.array_equal(covered_region(grid, 0.05), corners)
     full = OccupancyGrid(np.ones((4, 4), dtype=np.bool_), 0.05, np.zeros(2))
     assert covered_region(full, 0.0) is None and not is_open(full)
 
