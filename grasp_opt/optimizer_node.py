@@ -100,7 +100,7 @@ class OptimizerNode(Node):
             cancel=self._canceled,
             preempt=lambda request: self._preempt(),
         )
-        self._first_map = FirstMap(self, self._on_no_map)
+        self._first_map = FirstMap(self, names, self._on_no_map)
         if failure := warm_up(self._item, self._robot, self._weights):
             self.get_logger().debug(f"warm-up: {failure}")
 
@@ -121,8 +121,8 @@ class OptimizerNode(Node):
         if self._first_map.awaited or self._work is not None:
             self._begin(self._request)
 
-    def _on_no_map(self) -> None:
-        self._fail(PlanGroupPush.Result.NO_MAP, "no map has been received on /map")
+    def _on_no_map(self, reason: str) -> None:
+        self._fail(PlanGroupPush.Result.NO_MAP, reason)
 
     def _take_up(self, belief: Belief) -> None:
         """Plan with what is believed of the object and the robots now."""

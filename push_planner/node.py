@@ -97,7 +97,7 @@ class PlannerNode(Node):
             preempt=lambda request: self._preempt(),
         )
         self._paths = names.team("plan_robot_path")
-        self._first_map = FirstMap(self, self._on_no_map)
+        self._first_map = FirstMap(self, names, self._on_no_map)
         self._warm_up()
 
     @property
@@ -127,8 +127,8 @@ class PlannerNode(Node):
         if waiting or self._work is not None:
             self._begin(self._request)
 
-    def _on_no_map(self) -> None:
-        self._fail(PlanPush.Result.NO_MAP, "no map has been received on /map")
+    def _on_no_map(self, reason: str) -> None:
+        self._fail(PlanPush.Result.NO_MAP, reason)
 
     def _distances(self) -> DistanceField:
         assert self._grid is not None

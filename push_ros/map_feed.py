@@ -49,10 +49,12 @@ class MapFeed:
 
 
 class FirstMap:
-    """Lets a request wait for the first map; ``missed`` is called when none comes in time."""
+    """Lets a request wait for the first map; ``missed`` is called with a sentence when none comes
+    in time."""
 
-    def __init__(self, node: Node, missed: Callable[[], None]) -> None:
+    def __init__(self, node: Node, names: Names, missed: Callable[[str], None]) -> None:
         self._missed, self._since = missed, 0.0
+        self._reason = f"no map has been received on {names.world('map')}"
         self.awaited = False
         """Whether a request waits; set it to False when it has begun or ended."""
         node.create_timer(0.5, self._on_timer, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -64,4 +66,4 @@ class FirstMap:
     def _on_timer(self) -> None:
         if self.awaited and time.monotonic() - self._since > PATIENCE:
             self.awaited = False
-            self._missed()
+            self._missed(self._reason)
