@@ -286,9 +286,10 @@ class LocalLaw:
         return v
 
     def _search(self, reading: Reading, dt: float) -> Array:
-        """Velocity ``(2,)`` [m/s] of a robot that does not see the object: to the robots that it
-        sees, for some of them may; else to the target. If this has not helped for a time, it walks
-        straight on, in a new direction at each wall and now and then."""
+        """Velocity ``(2,)`` [m/s] of a robot that does not see the object: with a guide, to where
+        this says. Without one, to the robots that it sees, for some of them may see the object;
+        else to the target. If this has not helped for a time, it walks straight on, in a new
+        direction at each wall and now and then."""
         self._lost += dt
         walls = reading.walls
         if self._guide is not None:

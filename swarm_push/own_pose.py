@@ -23,7 +23,7 @@ _LEAST_TURN = 5e-4  # [rad]
 
 @settings
 class OwnPoseSettings:
-    """What a robot assumes of the errors of its sensor; all are standard deviations."""
+    """Errors of what a robot is told and of its scan, as standard deviations that it knows."""
 
     start_position: float = bounded(
         0.01,

@@ -53,8 +53,8 @@ class RobotSensorSettings:
         0.02,
         low=0.0,
         high=0.5,
-        doc="Standard deviation of the measured motion of the robot as a fraction of the motion "
-        "(dimensionless)",
+        doc="Standard deviation of the measured motion of the robot as a fraction of the motion; "
+        "the error is drawn anew for each measurement (dimensionless)",
     )
 
 
