@@ -79,7 +79,8 @@ class PlannerNode(Node):
         self._queued = False  # whether a slice waits for its turn
         self._draws = 0  # requests for pre-emptive pushes: each draws others
         self.plans = self.failures = 0
-        self.last_time = 0.0
+        self.last_time = self.planning_time = 0.0
+        """[s] wall time of the last plan, and CPU time of all plans."""
         self._diagnostics = Diagnostics(self, names, self._state)
         self._plan_publisher = self.create_publisher(PlanMessage, names.team("push_plan"), LATCHED)
         self._path_publisher = self.create_publisher(Path, names.team("push_path"), LATCHED)
@@ -229,6 +230,7 @@ class PlannerNode(Node):
         self._queued = False
         if self._work is None:
             return
+        cpu = time.thread_time()
         try:
             progress = next(self._work)
         except StopIteration:
@@ -237,6 +239,8 @@ class PlannerNode(Node):
         except PlanningFailed as error:
             self._fail(int(error.code), str(error))
             return
+        finally:
+            self.planning_time += time.thread_time() - cpu
         elapsed = time.monotonic() - self._started
         improved = progress.best is not self._best
         self._best = progress.best

@@ -63,6 +63,7 @@ def run_job(
         trace = run.observer.trace
         duration = run.bridge.time
         latency, spread = run.bridge.applied_latency
+        planning = run.planner.planning_time
     position, orientation = final_errors(trace, believed.goal)
     reached = state is not None and state.error_code == 0
     success = (
@@ -79,11 +80,10 @@ def run_job(
         "duration_s": duration,
         "pushes": trace.pushes,
         "contact_losses": trace.contact_losses,
-        "plan_time_s": trace.plan_time,
         "min_clearance_m": min_clearance(believed, trace),
         "collisions": trace.collisions,
         "replans": 0 if state is None else int(state.replans),
         "applied_latency_s": latency,
         "applied_latency_std_s": spread,
-        **job_times(trace, believed.robot()[1].differential),
+        **job_times(trace, believed.robot()[1].differential, planning),
     }, trace

@@ -27,7 +27,6 @@ class Trace:
     pushes: int = 0
     contact_losses: int = 0
     collisions: int = 0
-    plan_time: float = 0.0
     sides: tuple[int, ...] = ()  # of the object, one a push of the last plan
     solve_times: list[float] = field(default_factory=list)
 
@@ -120,7 +119,6 @@ class Observer(Node):
         )
 
     def _on_plan(self, message: PushPlan) -> None:
-        self.trace.plan_time = float(message.statistics.plan_time)
         self.trace.sides = tuple(int(s.side) for s in message.segments)
 
     def _on_status(self, message: ControllerStatus) -> None:

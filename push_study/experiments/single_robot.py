@@ -155,17 +155,23 @@ def _print_table(rows: list[Row], scenarios: list[str]) -> None:
 
 
 def _print_times(rows: list[Row], scenarios: list[str]) -> None:
-    """Means over the trials; see ``push_study.job_time`` for the shortest time."""
+    """Means over the trials; see ``push_study.job_time`` for the shortest time and the charge."""
     columns = ("job_time_s", *(f"{name.lower()}_s" for name in STATES), "shortest_time_s")
-    print("\nmean times [s]      job  plan  positioning  approach  push  detach   shortest  ratio")
+    print(
+        "\nmean times [s]      job  plan  positioning  approach  push  detach   shortest  ratio"
+        "  CPU of plans  ratio with it"
+    )
     for name in scenarios:
         mine = [r for r in rows if r["scenario"] == name and "job_time_s" in r]
         if mine:
             job, *spent, least = (np.mean([r[c] for r in mine]) for c in columns)
-            ratio = np.mean([r["time_ratio"] for r in mine])
+            ratio, cpu, charged = (
+                np.mean([r[c] for r in mine])
+                for c in ("time_ratio", "planning_cpu_s", "charged_ratio")
+            )
             print(
                 f"{name:15s} {job:7.1f}{spent[0]:6.1f}{spent[1]:13.1f}{spent[2]:10.1f}"
-                f"{spent[3]:6.1f}{spent[4]:8.1f}{least:11.1f}{ratio:7.2f}"
+                f"{spent[3]:6.1f}{spent[4]:8.1f}{least:11.1f}{ratio:7.2f}{cpu:14.1f}{charged:15.2f}"
             )
     print("(shortest: the faster wheel at its limit along the path that the robot drove)")
 

@@ -50,13 +50,16 @@ def test_times_by_state_add_up_to_the_time_of_the_job():
         "PUSHING": 7.0,
         "DETACHING": 0.5,
     }
-    row = job_times(trace, DRIVE)
+    row = job_times(trace, DRIVE, 2.0)
     assert row["job_time_s"] == pytest.approx(8.5) and row["pushing_s"] == 7.0
     assert row["path_length_m"] == pytest.approx(0.1)
     assert row["time_ratio"] == pytest.approx(8.5)
+    # A plan of 2 s took 0.5 s of simulated time.
+    assert row["charged_s"] == row["charged_ratio"] == pytest.approx(10.0)
+    assert job_times(trace, DRIVE, 0.3)["charged_s"] == row["job_time_s"]
 
 
 def test_a_job_that_was_not_seen_has_no_ratio():
     assert len(path(Trace())) == 0
-    row = job_times(Trace(), DRIVE)
+    row = job_times(Trace(), DRIVE, 0.0)
     assert row["job_time_s"] == 0.0 and math.isnan(row["time_ratio"])
