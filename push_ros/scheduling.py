@@ -40,7 +40,8 @@ class Urgency(Enum):
     """How soon a node must run. The value is its real-time priority (1 to 99); not positive: none.
 
     WORLD: it measures and moves robots, and stops them when no command comes. CONTROL: it answers
-    poses with commands. BACKGROUND: it plans, records or shows, and gives way to other processes.
+    poses with commands, or with the heartbeat without which a robot stops. BACKGROUND: it plans,
+    records or shows, and gives way to other processes.
     """
 
     WORLD = 11

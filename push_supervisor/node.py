@@ -26,6 +26,7 @@ from push_ros.parameters import declare_settings
 from push_ros.pose_feed import Frame, PoseFeed
 from push_ros.process import run_node
 from push_ros.qos import LATCHED, STREAM
+from push_ros.scheduling import Urgency
 from push_ros.validation import FRAME
 from push_scenario.scenario import Scenario, load_scenario
 from push_supervisor import commands, events, motions
@@ -384,7 +385,7 @@ class SupervisorNode(Node):
 
 def main() -> int:
     """Entry point of the process: ``--ros-args`` on its command line."""
-    return run_node(SupervisorNode)
+    return run_node(SupervisorNode, urgency=Urgency.CONTROL)
 
 
 if __name__ == "__main__":
