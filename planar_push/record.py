@@ -34,4 +34,4 @@ def run(arguments: argparse.Namespace) -> int:
             Path(arguments.out), scenario, namespace=arguments.namespace, about=LIVE
         )
 
-    return int(run_node(make, [], urgency=Urgency.BACKGROUND))
+    return int(run_node(make, [], urgency=Urgency.ORDINARY))

@@ -27,7 +27,7 @@ LIVE = {"pace": "live"}
 """Metadata of a bag that a recorder in a process of its own writes."""
 
 _PATIENCE = 5.0  # [s] wall time to receive the scenario
-_QUIET, _TAIL = 0.2, 1.0  # [s] wall time without a message after which a bag is closed; at most
+_QUIET, _TAIL = 0.2, 2.0  # [s] wall time without a message after which a bag is closed; at most
 
 
 def heard_scenario(namespace: str = "", limit: float | None = None) -> Scenario:
@@ -142,7 +142,7 @@ class RecorderNode(Node):
 
 def main() -> int:
     """Entry point of the process: ``--ros-args`` on its command line."""
-    return int(run_node(partial(RecorderNode, about=LIVE), urgency=Urgency.BACKGROUND))
+    return int(run_node(partial(RecorderNode, about=LIVE), urgency=Urgency.ORDINARY))
 
 
 if __name__ == "__main__":

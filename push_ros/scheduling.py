@@ -41,7 +41,7 @@ class Urgency(Enum):
 
     WORLD: it measures and moves robots, and stops them when no command comes. CONTROL: it answers
     poses with commands, or with the heartbeat without which a robot stops. BACKGROUND: it plans,
-    records or shows, and gives way to other processes.
+    plays a bag or shows, and gives way to other processes. ORDINARY: it records.
     """
 
     WORLD = 11
