@@ -79,8 +79,9 @@ class PlannerNode(Node):
         self._queued = False  # whether a slice waits for its turn
         self._draws = 0  # requests for pre-emptive pushes: each draws others
         self.plans = self.failures = 0
-        self.last_time = self.planning_time = 0.0
-        """[s] wall time of the last plan, and CPU time of all plans."""
+        self.last_time = 0.0  # [s] wall time of the last plan
+        self.planning_time = 0.0
+        """[s] CPU time of all plans so far."""
         self._diagnostics = Diagnostics(self, names, self._state)
         self._plan_publisher = self.create_publisher(PlanMessage, names.team("push_plan"), LATCHED)
         self._path_publisher = self.create_publisher(Path, names.team("push_path"), LATCHED)

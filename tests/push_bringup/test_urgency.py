@@ -17,7 +17,7 @@ BETWEEN_POSES_AND_COMMANDS = {
     METHOD_MODULE,
     MODULES["supervisor"],  # without its heartbeat at each frame the controller stops the robot
 }
-LOSES_MESSAGES = {MODULES["recorder"]}  # if it waits for too long
+LOSES_MESSAGES = {MODULES["recorder"], "planar_push.record"}  # if it waits for too long
 BRIDGES = {MODULES["bridge"], MODULES["lab_bridge"]}
 
 
@@ -25,7 +25,9 @@ def source(module):
     return Path(importlib.util.find_spec(module).origin).read_text()
 
 
-@pytest.mark.parametrize("module", sorted({*MODULES.values(), "planar_push.view"}))
+@pytest.mark.parametrize(
+    "module", sorted({*MODULES.values(), "planar_push.view", "planar_push.record"})
+)
 def test_what_is_between_poses_and_commands_goes_first_and_what_computes_gives_way(module):
     (words,) = re.findall(r"run_node\((.*)\)", source(module))
     if module in BRIDGES:
