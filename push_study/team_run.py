@@ -69,8 +69,9 @@ class TeamTrace:
     ways ``(t, 1 + n, 3)``: poses of object and robots, every ``TRACE`` seconds; phases: [s] of each
     phase that the method reported; figures: values of its figures by name, at every report; forces
     ``(n, 2)`` [N] of the robots on the object, mean of each tick that ends at force_times [s];
-    collision_ticks: ticks in which robots touched each other, or anything a wall. outlines: of the
-    object as estimators published them, ``(k, 2)`` [m], each with the time [s] of its poses.
+    collision_ticks: ticks in which robots touched each other, or anything a wall; obstacle_ticks:
+    the latter alone. outlines: of the object as estimators published them, ``(k, 2)`` [m], each
+    with the time [s] of its poses.
     """
 
     times: list[float] = field(default_factory=list)
@@ -80,6 +81,7 @@ class TeamTrace:
     force_times: list[float] = field(default_factory=list)
     forces: list[Array] = field(default_factory=list)
     collision_ticks: int = 0
+    obstacle_ticks: int = 0
     outlines: list[tuple[float, Array]] = field(default_factory=list)
     now: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
@@ -128,6 +130,7 @@ class Outcome:
             "pushes": self.pushes,
             "replans": self.replans,
             "collision_ticks": self.trace.collision_ticks,
+            "obstacle_ticks": self.trace.obstacle_ticks,
             **self.drawn,
         }
 
@@ -173,7 +176,7 @@ class TeamObserver(Node):
     def _on_contacts(self, message: Contacts) -> None:
         if not self.recording:
             return
-        forces, hit = np.zeros((len(self._robots), 2)), False
+        forces, hit, wall = np.zeros((len(self._robots), 2)), False, False
         for k, (a, b) in enumerate(zip(message.body_a, message.body_b, strict=True)):
             other, sign = (b, 1.0) if a == OBJECT else (a, -1.0)  # the force is on body a
             if OBJECT in (a, b) and other in self._robots:
@@ -181,9 +184,11 @@ class TeamObserver(Node):
                 forces[self._robots.index(other)] += force
             else:
                 hit = True
+                wall |= not {a, b} <= set(self._names)
         self.trace.force_times.append(time_from_ros(message.header.stamp))
         self.trace.forces.append(forces)
         self.trace.collision_ticks += hit
+        self.trace.obstacle_ticks += wall
 
     def _on_belief(self, message: Belief) -> None:
         for outline in message.outlines:

@@ -8,6 +8,8 @@ import numpy as np
 from push_bringup.systems import OUTLINE_ESTIMATOR
 from push_job.method import Task, method_spec
 from push_model.arrays import Array
+from push_model.distance_field import DistanceField
+from push_model.occupancy import rasterise
 from push_scenario.bodies import load_robot
 from push_scenario.scenario import Scenario
 from push_study.experiments.swarm_outline import mistaken
@@ -53,19 +55,23 @@ def play(match: Match) -> Row:
     )
     spent = time.process_time() - began
     away, turned = outcome.error
+    reached = outcome.success and (what.kind == POSITIONS or not outcome.trace.obstacle_ticks)
     near = away <= _SLACK * what.tolerance[0] and turned <= _SLACK * what.tolerance[1]
     row: Row = {
         "scenario": match.scenario,
         "seed": match.seed,
         "method": match.method,
-        "success": bool(outcome.success and near),
+        "success": bool(reached and near),
         **outcome.row(),
         "cpu_s": spent,
     }
     if row["success"]:
-        direct = straight(problem)
+        direct, ways = straight(problem), np.array(outcome.trace.ways)[:, 0]
         row["lambda"] = outcome.charged * problem.robot.max_speed / direct
-        row["path_ratio"] = _length(np.array(outcome.trace.ways)[:, 0]) / direct
+        row["path_ratio"] = _length(ways) / direct
+        row["clearance_m"] = _clearance(problem, ways)
+    elif outcome.success and not reached:
+        row["reason"] = f"touched obstacles, in {outcome.trace.obstacle_ticks} ticks"
     elif outcome.success:
         row["reason"] = f"said it was done {1e3 * away:.0f} mm, {turned:.2f} rad off"
     return row
@@ -101,6 +107,13 @@ def _disc(scenario: Scenario) -> Scenario:
     item, start = scenario.objects[OBJECT]
     scenario = replace(scenario, objects={OBJECT: (mistaken(item, None), start)})
     return scenario.settings(OUTLINE_ESTIMATOR, enabled=True)
+
+
+def _clearance(problem: Problem, ways: Array) -> float:
+    """[m] least distance of the object's nominal outline from obstacles of the map, every
+    ``TRACE`` seconds of its true poses ``(n, 3)``."""
+    field = DistanceField(rasterise(problem.environment))
+    return float(field.clearances(problem.item.outline, ways).min())
 
 
 def _length(ways: Array) -> float:

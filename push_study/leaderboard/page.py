@@ -21,6 +21,7 @@ HEADS = (
     "Λ, 95 % interval",
     "time [s]",
     "path / straight",
+    "clearance [mm]",
     "CPU [s]",
     "leads",
     "source",
@@ -28,7 +29,7 @@ HEADS = (
 COLUMNS = (
     *("contest", "rank", "method", "outline", "robots", "control", "trials", "successes"),
     *("share_low", "share_high", "lambda", "lambda_low", "lambda_high", "time_s", "path_ratio"),
-    *("cpu_s", "leads", "ranked", "why_not", "source"),
+    *("cpu_s", "clearance_m", "leads", "ranked", "why_not", "source"),
 )
 
 
@@ -57,7 +58,10 @@ noise, latency, drawn frictions and tolerances; a seed gives every method the sa
 are only among methods that are told the same. A method of other authors is ranked only if our
 reconstruction of it reaches the figure of its own paper. Λ is the time until the object is there,
 CPU time of planning included, over the time of a robot at full speed on the straight line; it is
-the mean over the matches that reach the goal. <em>Leads</em> names the ranked methods of the same
+the mean over the matches that reach the goal. In the contests <code>env…</code> and
+<code>plates-…</code>, a match in which the object or a robot touches an obstacle does not count as
+reached. Clearance is the least distance of the object from obstacles over all matches that reach
+the goal. <em>Leads</em> names the ranked methods of the same
 information whose interval lies entirely on the worse side. CPU is that of the whole match, the
 simulation included. Two runs with equal seeds differ only in CPU times, and by these in the
 planning that Λ and time contain.</p>"""
@@ -88,6 +92,7 @@ def _row(c: Cell) -> list[Any]:
         _span(c.lambda_interval),
         _number(c.seconds, 1),
         _number(c.path, 2),
+        _number(1e3 * c.clearance, 1),
         _number(c.cpu, 1),
         ", ".join(c.leads) or "–",
         c.entry.source + (f" ({c.entry.why_not})" if c.entry.why_not else ""),
@@ -99,7 +104,7 @@ def _line(c: Cell) -> list[Any]:
     return [
         *(c.contest, c.rank or "", c.entry.name, told.outline, told.robots, told.control),
         *(c.trials, c.successes, c.share[0], c.share[1], _csv(c.lambda_)),
-        *map(_csv, (*c.lambda_interval, c.seconds, c.path, c.cpu)),
+        *map(_csv, (*c.lambda_interval, c.seconds, c.path, c.cpu, c.clearance)),
         *(";".join(c.leads), c.entry.ranked, c.entry.why_not, c.entry.source),
     ]
 

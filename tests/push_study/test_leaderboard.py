@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.stats import binom
+from shapely import Polygon
 
 from planar_push.main import main
+from push_model.jobs import JobError
 from push_model.outlines import distance, inside
 from push_model.se2 import transform
 from push_model.settings import SettingsError
@@ -20,6 +22,7 @@ from push_study.leaderboard.match import Match, entry_of, play
 from push_study.leaderboard.standings import cells, leads, mean_interval
 from push_study.pool import guarded
 from push_study.study import StudyOptions
+from push_study.team_run import Outcome, TeamTrace
 
 ALL, RADIUS = Told("exact", "all poses", "central"), Told("radius", "all poses", "central")
 KIND = frozenset({POSITIONS})
@@ -34,7 +37,13 @@ REFUSER = Entry("refuser", "gibbs", ALL, frozenset({POSES}))
 def row(method, success, value, contest="open-square"):
     found = {"scenario": contest, "method": method, "seed": 1, "success": success}
     found |= {"cpu_s": 1.0}
-    return found | ({"lambda": value, "charged_s": value, "path_ratio": 1.0} if success else {})
+    reached = {"lambda": value, "charged_s": value, "path_ratio": 1.0, "clearance_m": 0.1}
+    return found | (reached if success else {})
+
+
+def corners(size):
+    x, y = 0.5 * np.array(size)
+    return [(-x, -y), (x, -y), (x, y), (-x, y)]
 
 
 def named(*rows):
@@ -179,6 +188,34 @@ def test_what_a_method_refuses_or_breaks_counts_against_it():
     (cell,) = cells([good, refused, broken], {name: REFUSER}, ["env1"])
     assert (cell.successes, cell.trials) == (1, 3)
     assert leaderboard.statistics([good, refused, broken])["env1, refuser"]["trials"] == 3
+
+
+@pytest.mark.parametrize(("name", "method"), [("env2", "one robot"), ("open-square", "crescent")])
+def test_who_touches_an_obstacle_has_not_reached_the_goal(name, method, monkeypatch):
+    """Swarms may touch the walls of their empty room."""
+    problem = CONTESTS[name].draw(1)
+    ways = np.array([problem.start, problem.start + [0.0, 0.02, 0.0]])
+    robots = np.broadcast_to(problem.robots, (2, *problem.robots.shape))
+
+    def told(ticks):
+        trace = TeamTrace(obstacle_ticks=ticks, ways=list(np.hstack([ways[:, None], robots])))
+        outcome = Outcome(1, JobError.NONE, "", 30.0, 1.0, (0.001, 0.01), trace, {})
+        monkeypatch.setattr("push_study.leaderboard.match.run_team", lambda *_, **__: outcome)
+        return play(Match(name, 1, "", method, "planar", "mild"))
+
+    clean, touched = told(0), told(3)
+    assert clean["success"] and touched["obstacle_ticks"] == 3
+    room = Polygon(corners(problem.environment.size)).exterior
+    walls = [Polygon(p.vertices) for p in problem.environment.polygons] + [room]
+    outlines = [Polygon(transform(pose, problem.item.outline)) for pose in ways]
+    exact = min(wall.distance(outline) for wall in walls for outline in outlines)
+    cell = problem.environment.resolution
+    assert exact - 1.5 * cell < clean["clearance_m"] < exact + 1e-9
+    if name == "env2":
+        assert not touched["success"] and "touched obstacles, in 3 ticks" in touched["reason"]
+        assert "lambda" not in touched and "clearance_m" not in touched
+    else:
+        assert touched["success"] and touched["clearance_m"] == clean["clearance_m"]
 
 
 def test_only_settings_that_a_method_has_are_set(monkeypatch):
