@@ -96,6 +96,7 @@ def costs_of(scene, sides, lengths, turns):
     return time.pace * (sum(lengths) + farther) + len(lengths) * time.begin + change
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("com", [(0.0, 0.0), (0.01, 0.03)])
 def test_no_random_plan_costs_less(robot, box, com):
     """One to four runs of random curvatures; the bound is not told what the plan costs."""
@@ -184,6 +185,7 @@ def test_it_holds_from_a_slot_with_less_room_than_the_safety_distance(robot, box
     assert plan.cost_bound <= plan.cost and 0.5 * plan.cost < bound.value <= plan.cost
 
 
+@pytest.mark.long
 def test_it_is_near_the_best_plan_of_two_runs(robot, box):
     """Where no obstacle is near, and the pose in between is optimised."""
     random, scene = np.random.default_rng(4), open_scene(robot, box)

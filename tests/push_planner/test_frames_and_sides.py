@@ -151,6 +151,7 @@ def test_robots_that_cannot_push_are_refused(box):
         PushPlanner(QUICK, GRID, disc, box)
 
 
+@pytest.mark.long
 def test_plans_turn_more_tightly_where_friction_is_known_and_not_less_where_it_is_not(robot):
     """The certified curvatures replace the trusted part of the stable ones where they allow more;
     a wide interval leaves the plan as it was."""

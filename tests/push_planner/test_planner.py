@@ -22,6 +22,7 @@ from push_planner.push_reference import joined
 from push_planner.rough_cost import guessed_length
 from push_planner.shortest_chord import chord, shortest_chords
 from push_scenario.scenario import load_scenario, scenario_names
+from tests.samples import mostly_long
 
 START, GOAL = np.array([-1.15, -0.7, 0.0]), np.array([1.3, 0.75, 0.0])
 
@@ -113,7 +114,10 @@ def test_change_of_side_where_one_push_cannot_do(robot, box):
         assert before.object_end == pytest.approx(after.object_start)
 
 
-@pytest.mark.parametrize("name", [n for n in scenario_names() if n.startswith("env")])
+NINE = [n for n in scenario_names() if n.startswith("env")]
+
+
+@pytest.mark.parametrize("name", mostly_long(NINE, 3))
 def test_every_scenario_has_a_plan_that_later_ones_do_not_make_longer(name):
     scenario = load_scenario(name)
     planner = PushPlanner(

@@ -10,6 +10,7 @@ from push_model.settings import SettingsError
 from push_planner.point_pusher import PointPusher, PointPushSettings, PointTask
 from push_study.experiments import pusht
 from push_study.experiments.pusht import CENTRE, DISC, GYRATION, SCALE, T
+from tests.samples import mostly_long
 
 OUTLINE, ROOM = T - CENTRE, (0.001, 0.511)
 GOAL = np.array([0.256, 0.256, 1.0])
@@ -36,7 +37,7 @@ def reach(seed, gyration, frames=200):
     return frames
 
 
-@pytest.mark.parametrize("gyration", [0.85 * GYRATION, GYRATION, 1.15 * GYRATION])
+@pytest.mark.parametrize("gyration", mostly_long([1.15 * GYRATION, GYRATION, 0.85 * GYRATION], 1))
 def test_the_t_is_brought_to_its_place_also_where_the_model_is_wrong(gyration):
     assert reach(1, gyration) < 200
 

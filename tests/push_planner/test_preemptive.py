@@ -24,6 +24,7 @@ def last(work):
     return list(work)[-1].best
 
 
+@pytest.mark.long
 def test_the_pre_emptive_push_is_the_first_of_the_plan():
     planner, goal, _ = needs_preemptive_push(load_scenario("short"), START)
     reports = list(plan_after_preemptive_push(planner, START, goal, planner.settings.seed + 1))

@@ -14,8 +14,9 @@ from push_planner import PlanError, PlannerSettings, PlanningFailed, PushPlanner
 from push_planner.cost_bound import CostBound
 from push_planner.push_curve import PushCurve
 from push_planner.push_reference import joined
+from tests.samples import mostly_long
 
-COUNT = 30
+COUNTS = 8, 30
 
 
 def attempt(planner, start, goal, seed=None):
@@ -38,24 +39,25 @@ def planner(scenario, robot, box):
     return PushPlanner(PlannerSettings(), scenario.grid, robot, box)
 
 
-@pytest.fixture(scope="module")
-def outcomes(planner):
-    return [(s, g, *attempt(planner, s, g)) for s, g in problems(planner, COUNT, 3)]
+@pytest.fixture(scope="module", params=mostly_long(COUNTS, 1))
+def outcomes(planner, request):
+    return [(s, g, *attempt(planner, s, g)) for s, g in problems(planner, request.param, 3)]
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("outcomes", COUNTS[1:], indirect=True)
 def test_no_plan_is_worse_than_an_earlier_one(outcomes):
     improved = 0
     for _, _, plans, _ in outcomes:
         costs = [p.cost for p in plans[:-1]]  # the last one has wider bends
         assert all(b < a for a, b in zip(costs, costs[1:], strict=False))
         improved += len(costs) > 1
-    assert improved > COUNT / 2
+    assert improved > len(outcomes) / 2
 
 
 def test_nearly_every_problem_is_solved_and_the_others_say_why(outcomes):
     unsolved = [error for _, _, _, error in outcomes if error is not None]
-    assert len(unsolved) <= 0.08 * COUNT
+    assert len(unsolved) <= 0.08 * len(outcomes)
     for error in unsolved:
         assert error.code is PlanError.NO_PUSH_SEQUENCE
         assert "start" in str(error) or "goal" in str(error)
@@ -80,6 +82,8 @@ def test_costs_are_those_of_the_pushes_and_no_lower_than_the_bound(outcomes, pla
         assert all(plan.cost >= bound.value - 1e-9 for plan in plans)
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("outcomes", COUNTS[1:], indirect=True)
 def test_bends_are_wider_where_that_costs_hardly_anything(outcomes, planner):
     """The final plan against the cheapest one: how much of the stable curvatures it uses."""
     sides = {side.index: side for side in planner.scene.sides}
@@ -133,7 +137,7 @@ def test_plans_join_start_and_goal_by_stable_pushes_that_touch_no_occupied_cell(
                         assert not grid.occupied[row, column]
                 at = segment.object_end
             assert at[:2] == pytest.approx(goal[:2]) and abs(se2.wrap(at[2] - goal[2])) < 1e-9
-    assert pushes > COUNT
+    assert pushes > len(outcomes)
 
 
 def test_equal_seeds_give_equal_plans_to_the_bit(outcomes, planner, scenario, robot, box):

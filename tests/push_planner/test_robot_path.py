@@ -75,6 +75,7 @@ def test_the_way_keeps_its_distance_away_from_tight_ends(robot):
     assert found > 120 and tight > 40
 
 
+@pytest.mark.long
 def test_where_an_end_is_tight_the_bumper_keeps_off_as_far_as_any_motion_lets_it(
     robot, monkeypatch
 ):

@@ -81,6 +81,7 @@ def test_headings_afterwards_differ_and_those_with_more_room_come_first(planner)
             assert all(abs(se2.wrap(one - other)) >= 0.3 for other in headings[:k])
 
 
+@pytest.mark.long
 def test_an_object_that_no_push_leads_away_is_turned_first(planner):
     with pytest.raises(PlanningFailed):
         planner.solve(STUCK, GOAL)

@@ -55,6 +55,7 @@ def test_a_robot_that_cannot_pass_the_object_does_not_plan_to_push_it_back(robot
     assert refused_changes(wide, plan, here) == 0
 
 
+@pytest.mark.long
 def test_plans_beside_a_body_never_ask_for_a_way_that_the_robot_does_not_have(monkeypatch):
     """A body stands in front of the box; unchecked, some plans need a way that is blocked."""
     scenario = load_scenario("env1-target1")

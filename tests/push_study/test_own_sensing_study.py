@@ -32,6 +32,7 @@ def test_a_map_is_tried_with_every_object_from_places_of_the_maps_study(tmp_path
         assert 2.5 < way < 4.0 and len(scenario.robots) == 20
 
 
+@pytest.mark.long
 def test_a_slice_of_the_study_is_reached_and_prints_its_table(tmp_path, capsys):
     options = StudyOptions(("robots-10",), 1, 1, tmp_path)
     (task,) = tasks = own_sensing.tasks(options)

@@ -13,6 +13,7 @@ from swarm_push.crescent import crescent
 from swarm_push.rim import Rim
 from swarm_push.spacing import keep_apart
 from swarm_push.way_round import WayRound
+from tests.samples import mostly_long
 
 R = 0.05
 NAMES = (
@@ -85,7 +86,7 @@ def test_a_crescent_for_nothing_lies_all_round():
     )
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", mostly_long(NAMES, 2))
 def test_ways_round_an_object_come_to_their_ends_without_touching_it(name):
     item = load_object(name)
     body = shapely.Polygon(item.geometry.outline)

@@ -14,6 +14,7 @@ from push_model.specs import BoxSpec, EnvironmentSpec
 from push_ros.door import Door
 from push_scenario.bodies import load_object, load_robot
 from swarm_push.swarm_method import SwarmMethod
+from tests.samples import mostly_long
 from tests.swarm_push.test_object_track import LONGEST, TICK, snake
 
 ITEM, ROBOT = load_object("transport_l"), load_robot("epuck_ring")
@@ -82,7 +83,7 @@ def test_no_tick_is_long_while_a_task_is_judged_in_a_large_room_with_walls(targe
     assert spent.max() < LONGEST
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", mostly_long(range(40), 8))
 def test_the_answer_in_slices_is_the_answer_at_once(seed):
     """Rooms, loads and goals at random, reachable or not."""
     random = np.random.default_rng(seed)

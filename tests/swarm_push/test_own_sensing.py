@@ -20,6 +20,7 @@ from sim_bridge.planar_world import PlanarWorld
 from swarm_push.local_law import LocalLaw, LocalLawSettings, seen_centre
 from swarm_push.own_sensing import METHOD, OwnSensing
 from swarm_push.robot_sensor import RobotSensor, RobotSensorSettings
+from tests.samples import mostly_long
 
 SQUARE, ROBOT = load_object("transport_square"), load_robot("epuck_ring")
 RADIUS, SPEED = ROBOT.footprint_radius, ROBOT.max_speed
@@ -180,7 +181,9 @@ def drive(item, seed, limit, count=20, true=None, **settings):
     return method.status, tick / 100, closest
 
 
-@pytest.mark.parametrize(("name", "seed"), [("square", 1), ("square", 2), ("triangle", 1)])
+@pytest.mark.parametrize(
+    ("name", "seed"), mostly_long([("square", 1), ("square", 2), ("triangle", 1)], 1)
+)
 def test_twenty_robots_bring_an_object_two_metres(name, seed):
     status, seconds, closest = drive(load_object(f"transport_{name}"), seed, 60.0)
     assert status.code == 0, status.reason

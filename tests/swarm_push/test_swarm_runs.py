@@ -20,6 +20,7 @@ from push_study.uncertainty import uncertainty
 from swarm_push.region import covered_region
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
 from tests.driving import GroupWorld
+from tests.samples import mostly_long
 
 HALF = 2.0
 NONE = np.zeros((0, 3))
@@ -65,7 +66,7 @@ def reaches(seed, tolerance):
     return job.error is JobError.NONE and not job.busy and away < tolerance and turned < 0.05
 
 
-@pytest.mark.parametrize("seed", [1, 4, 16])
+@pytest.mark.parametrize("seed", mostly_long([16, 1, 4], 1))
 def test_five_millimetres_are_reached(seed):
     assert reaches(seed, 5e-3)
 
@@ -76,7 +77,9 @@ def test_five_millimetres_are_reached_in_95_of_100():
     assert np.mean(done) >= 0.95, [k for k in range(50) if not done[k]]
 
 
-@pytest.mark.parametrize(("seed", "scale"), [(0, 0.9), (5, 0.9), (21, 0.912), (14, 1.1)])
+@pytest.mark.parametrize(
+    ("seed", "scale"), mostly_long([(0, 0.9), (14, 1.1), (5, 0.9), (21, 0.912)], 2)
+)
 def test_no_live_robot_is_declared_dead_where_the_outline_is_off(seed, scale):
     assert not run(seed, 25.0, scale)[1]
 
@@ -127,7 +130,7 @@ def jam(seed, count, kill=0, limit=35.0):
     return declared - dead, declared & dead
 
 
-@pytest.mark.parametrize(("seed", "count", "kill"), [(0, 16, 0), (1, 20, 2)])
+@pytest.mark.parametrize(("seed", "count", "kill"), mostly_long([(0, 16, 0), (1, 20, 2)], 1))
 def test_no_disc_is_declared_dead_that_is_jammed_at_an_object_that_does_not_move(seed, count, kill):
     wrong, found = jam(seed, count, kill)
     assert not wrong and len(found) == kill

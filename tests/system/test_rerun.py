@@ -63,9 +63,8 @@ def no_context_is_left():
 @pytest.mark.parametrize(
     "system",
     [
-        *(pytest.param(s, marks=pytest.mark.long) for s in ("single", "group")),
+        *(pytest.param(s, marks=pytest.mark.long) for s in ("single", "group", "stable-nmpc")),
         "swarm",
-        "stable-nmpc",
     ],
 )
 def test_a_run_of_each_system_is_repeated_to_the_bit(system, tmp_path):
