@@ -14,6 +14,7 @@ from grasp_opt.placement_nlp import LocalPlacer
 from grasp_opt.robust_placement import robust_placement
 from push_model.shape_specs import RectangleShape
 from push_scenario.bodies import load_object
+from tests.samples import mostly_long
 
 SIX = study_trajectories()
 FEW = PlacementSettings(steps=12)
@@ -68,7 +69,7 @@ def test_costs_of_random_placements_are_exact(model):
         assert errors <= found * (1 + 1e-6) and (forces**2).sum() > 0.0
 
 
-@pytest.mark.parametrize("name", list(plates()))
+@pytest.mark.parametrize("name", mostly_long(plates(), 2))
 @pytest.mark.parametrize("count", [2, 3])
 def test_no_placement_of_a_finer_grid_is_better(name, count):
     item = plates()[name]
@@ -162,7 +163,7 @@ def test_a_greater_margin_is_asked_for_where_there_is_one():
     assert none.margin < 0.1
 
 
-@pytest.mark.parametrize("name", list(plates()))
+@pytest.mark.parametrize("name", mostly_long(plates(), 2))
 @pytest.mark.parametrize("count", [2, 3])
 def test_no_placement_costs_less_than_the_lower_bound(name, count):
     """Random placements and the best known one, by an exact solver; boxes large and small."""

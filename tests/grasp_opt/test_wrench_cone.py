@@ -99,6 +99,7 @@ def random_grasps(random, count):
         yield rays, random.normal(size=3)
 
 
+@pytest.mark.long
 def test_ten_thousand_random_grasps_agree_with_a_linear_programme():
     """One wrench each; half of them drawn within the cone or near its boundary."""
     random = np.random.default_rng(7)

@@ -6,6 +6,7 @@ from shapely import LinearRing, MultiPoint, Point, Polygon
 
 from push_estimation.outline_estimate import OutlineEstimate
 from push_estimation.outline_learner import OutlineLearner
+from tests.samples import mostly_long
 
 R = 0.037  # [m]
 NOISE = 1e-3  # [m] of one frame
@@ -61,7 +62,7 @@ def error(outline, truth):
 
 
 @pytest.mark.parametrize("seeds", [range(20), pytest.param(range(20, 80), marks=pytest.mark.long)])
-@pytest.mark.parametrize("first", ["-20 %", "+20 %", "disc"])
+@pytest.mark.parametrize("first", mostly_long(["disc", "-20 %", "+20 %"], 1))
 def test_all_round_any_object_the_outline_is_found(first, seeds):
     """80 objects. The worst errors are at tips sharper than 60 degrees, whose flanks robots feel
     but not their ends."""
@@ -129,7 +130,7 @@ def test_a_place_where_a_robot_seemed_to_be_stopped_is_dropped_when_others_get_d
     assert len(estimate.sightings.contacts) > 3 and estimate.forgotten == 0
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", mostly_long(range(20), 5))
 def test_what_was_seen_with_a_frozen_pose_is_found_out_and_forgotten(seed):
     """FAULTS: the object moves on, its pose does not; robots seem to go through it."""
     random = np.random.default_rng(seed)

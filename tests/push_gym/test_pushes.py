@@ -74,6 +74,7 @@ def test_a_team_that_the_method_cannot_drive_is_refused():
         push_gym.parallel_env("group", action="push")
 
 
+@pytest.mark.long
 def test_the_example_reaches_its_goals(monkeypatch, capsys):
     monkeypatch.syspath_prepend(str(Path(__file__).resolve().parents[2] / "examples"))
     example = importlib.import_module("gym_push_by_push")

@@ -12,6 +12,7 @@ from push_estimation.dead_reckoning import DeadReckoning
 from push_model import CurvatureLimits, DifferentialDrive, se2, unicycle_step
 from push_model.trajectory import along_curve
 from push_mpc import LtvMpc, MpcSettings, Push, Task, TrackError, TrackerSettings, TrajectoryTracker
+from tests.samples import mostly_long
 
 DRIVE = DifferentialDrive(0.0205, 0.0265, 6.28)
 GRASP = np.array([0.095, 0.0, 0.0])
@@ -148,7 +149,7 @@ def test_an_attached_box_has_no_offset_whatever_the_delay(drop):
 
 
 @pytest.mark.parametrize("law", [attached, pushed])
-@pytest.mark.parametrize("drop", [0.0, 0.3])
+@pytest.mark.parametrize("drop", mostly_long([0.3, 0.0], 1))
 def test_a_push_with_slow_late_poses_ends_where_it_should(law, drop):
     """25 Hz and 80 ms, noise of the motion capture on both poses, frames without one or both."""
     slid = 0.0

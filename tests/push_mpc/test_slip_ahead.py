@@ -94,6 +94,7 @@ def test_intervals_that_reach_beyond_the_object_certify_nothing(robot, box, push
     assert {t.stick_margin for t in ticks} == {-math.inf}
 
 
+@pytest.mark.long
 def test_a_push_ends_before_the_bend_on_which_the_object_would_slip(robot, box, push):
     """Forty frictions and bends; what is believed arrives at a random time."""
     random, ended = np.random.default_rng(1), 0

@@ -11,6 +11,7 @@ from push_model.torque_robot import TorqueRobot
 from push_mpc.torque_prediction import NEWTON, ROWS
 from push_mpc.wheel_slip_nmpc import WheelSlipNmpc, WheelSlipSettings, beside
 from push_scenario.scenario import load_scenario
+from tests.samples import mostly_long
 
 PIONEER = next(iter(load_scenario("pioneer").robots.values()))[0]
 FULL = replace(WheelSlipSettings(), friction_trust=1.0, sideways_share=1.0)
@@ -86,7 +87,7 @@ def test_slopes_against_differences(nmpc, load):
             assert G[:, i] == pytest.approx((above - nmpc._c) / 2e-6, abs=1e-5)
 
 
-@pytest.mark.parametrize("constraint", [True, False])
+@pytest.mark.parametrize("constraint", mostly_long([True, False], 1))
 def test_the_optimum_is_that_of_ipopt(constraint):
     """From nothing, and with the last solution; local, as both are: nearly always the same."""
     nmpc = WheelSlipNmpc(replace(FULL, constraint=constraint), PIONEER)

@@ -139,6 +139,7 @@ def test_no_random_plan_costs_less(robot, box, com):
     assert near > 30 and two > 25 and several > 3
 
 
+@pytest.mark.long
 def test_the_bound_of_a_box_is_not_above_that_of_a_pose_in_it(robot, box):
     random, scene = np.random.default_rng(5), open_scene(robot, replace(box, com=(0.01, 0.03)))
     near = 0

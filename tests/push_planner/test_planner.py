@@ -117,7 +117,7 @@ def test_change_of_side_where_one_push_cannot_do(robot, box):
 NINE = [n for n in scenario_names() if n.startswith("env")]
 
 
-@pytest.mark.parametrize("name", mostly_long(NINE, 3))
+@pytest.mark.parametrize("name", mostly_long(NINE, 2))
 def test_every_scenario_has_a_plan_that_later_ones_do_not_make_longer(name):
     scenario = load_scenario(name)
     planner = PushPlanner(

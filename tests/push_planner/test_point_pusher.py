@@ -50,7 +50,7 @@ def test_it_is_brought_there_from_anywhere():
     assert sum(f < 200 for f in frames) >= 19 and np.median(frames) < 100
 
 
-@pytest.mark.parametrize("count", [4, pytest.param(40, marks=pytest.mark.long)])
+@pytest.mark.parametrize("count", mostly_long([2, 40], 1))
 def test_the_disc_reaches_its_pushes_without_touching_the_object(count):
     """Random plans, carried out until the push begins: on the way nothing is touched."""
     random, item, begun = np.random.default_rng(3), body(OUTLINE, GYRATION), 0

@@ -142,7 +142,7 @@ def test_plans_join_start_and_goal_by_stable_pushes_that_touch_no_occupied_cell(
 
 def test_equal_seeds_give_equal_plans_to_the_bit(outcomes, planner, scenario, robot, box):
     other = PushPlanner(PlannerSettings(), scenario.grid, robot, box)
-    for start, goal, plans, _ in outcomes[:5]:
+    for start, goal, plans, _ in outcomes[:3]:
         again, _ = attempt(other, start, goal)
         assert [p.cost for p in again] == [p.cost for p in plans]
         for a, b in zip(again[-1].segments, plans[-1].segments, strict=True):

@@ -221,6 +221,7 @@ print(f"{(after - before) / 1024:.1f} {first:.3f} {ways:.3f}")
 """
 
 
+@pytest.mark.long
 def test_memory_on_a_map_of_four_million_cells():
     """100 m x 100 m: grid, field, first plan and a robot's way across take under 300 MB."""
     done = subprocess.run(

@@ -41,6 +41,7 @@ def beside_walls(planner, count, seed):
             yield pose, pushes
 
 
+@pytest.mark.long
 def test_robot_and_object_keep_their_distance_and_do_not_overlap(planner):
     scene, seen = planner.scene, 0
     for start, pushes in beside_walls(planner, 40, 1):

@@ -54,6 +54,7 @@ def test_optimised_places_hold_the_wrench_where_the_margin_says_so_and_nearly_el
     assert ours < 0.2 * theirs
 
 
+@pytest.mark.long
 def test_the_table_the_verdict_and_the_picture(slice_, capsys):
     out, task, row = slice_
     tasks = study.tasks(options(out))

@@ -24,6 +24,7 @@ def chosen(task):
     return choose(settings, item, robot, 3, path[task.trajectory]).selection
 
 
+@pytest.mark.long
 def test_the_selected_grasp_is_better_by_its_criterion_and_both_meet_the_requirements():
     for trajectory in ("polynomial-1", "sinusoid-2"):
         best, some = chosen(task("selected", trajectory)), chosen(task("random", trajectory))

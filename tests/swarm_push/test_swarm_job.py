@@ -56,7 +56,7 @@ def play(job, name, count, seed=1, limit=300.0, meanwhile=None, world="planar"):
 NAMES = ("swarm_square", "swarm_ellipse", "swarm_rectangle", "plate_triangle", "swarm_flower")
 
 
-@pytest.mark.parametrize("seed", mostly_long(range(10), 3))
+@pytest.mark.parametrize("seed", mostly_long(range(10), 2))
 def test_random_poses_are_reached(seed):
     random = np.random.default_rng(seed)
     name, count = NAMES[seed % 5], int(random.integers(5, 14))
@@ -81,6 +81,7 @@ def test_targets_in_a_row_are_reached_by_both_laws(law):
     assert np.hypot(*pose[:2]) < 0.105
 
 
+@pytest.mark.long
 def test_the_crescent_is_far_ahead_of_the_printed_law():
     times = []
     for law in ("crescent", "thesis"):
@@ -180,6 +181,7 @@ def test_an_object_that_its_robots_cannot_move_is_given_up_soon_and_no_robot_is_
     assert not job.dead
 
 
+@pytest.mark.long
 def test_an_object_that_its_robots_can_just_move_is_not_refused():
     """5.3 N are needed."""
     job, _, moved = push_heavy(1.8)

@@ -1,6 +1,7 @@
 """Robots that the scenario of a swarm does not name: obstacles until the swarm is told of them."""
 
 import numpy as np
+import pytest
 from rclpy.parameter import Parameter
 
 from push_msgs.msg import JobState, Velocities
@@ -55,6 +56,7 @@ def start(run):
     run.spin_until(lambda: False, 0.2)
 
 
+@pytest.mark.long
 def test_bodies_that_nobody_named_are_obstacles_and_are_not_commanded():
     with running() as run:
         start(run)

@@ -12,6 +12,7 @@ from push_model.jobs import JobError
 from push_msgs.msg import JobState
 from push_scenario.scenario import scenario_from_mapping
 from push_study.graph_run import LockstepRun
+from tests.samples import mostly_long
 
 PILLAR, RADIUS = (0.9, -0.6), 0.15
 PLATE = {
@@ -50,7 +51,7 @@ def scenario(system):
     return scenario_from_mapping(values, "pillar", "test")
 
 
-@pytest.mark.parametrize("system", ["group", "swarm"])
+@pytest.mark.parametrize("system", mostly_long(["group", "swarm"], 1))
 def test_a_goal_upon_a_pillar_is_refused_and_the_job_does_not_notice(system):
     with LockstepRun(scenario(system), system=system, quiet=True) as run:
         run.start()

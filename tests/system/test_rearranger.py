@@ -97,6 +97,7 @@ def run():
         yield Run(made, watches[0])
 
 
+@pytest.mark.long
 def test_two_boxes_reach_their_goals_and_equal_runs_are_equal_to_the_bit():
     rows = [run_rearrangement(two()) for _ in range(2)]
     for row in rows:

@@ -252,6 +252,7 @@ def test_a_live_bag_is_compared_by_distance(tmp_path, capsys):
     assert "/PUSHING" in told
 
 
+@pytest.mark.long
 def test_a_demo_in_lockstep_ends_with_a_report_and_can_be_repeated(tmp_path, capsys):
     words = ["demo", "swarm", "--scenario", str(tmp_path / "small.yaml"), "--lockstep"]
     (tmp_path / "small.yaml").write_text(scenario_of("swarm").text)
