@@ -147,6 +147,7 @@ class TeamObserver(Node):
         """meanwhile: called with the time [s] and poses ``(1 + n, 3)`` of object and robots."""
         super().__init__("team_observer")
         self._names, self._robots = (OBJECT, *robots), tuple(robots)
+        self._movable = frozenset(self._names)
         self._meanwhile, self._last, self._reported = meanwhile, -math.inf, math.nan
         self._phase = ""
         self.trace = TeamTrace()
@@ -184,7 +185,7 @@ class TeamObserver(Node):
                 forces[self._robots.index(other)] += force
             else:
                 hit = True
-                wall |= not {a, b} <= set(self._names)
+                wall |= not self._movable.issuperset((a, b))
         self.trace.force_times.append(time_from_ros(message.header.stamp))
         self.trace.forces.append(forces)
         self.trace.collision_ticks += hit
