@@ -117,6 +117,7 @@ class JobIntake:
         self._no_plan_only = no_plan_only
         others = () if choice is None else choice.names_of_objects
         self._keeper = JobKeeper(memory or JobMemory.of_process(), (item, *robots), others)
+        self._dropped: GoalRefused | None = None  # why the last job ended, not taken up again
         self._run, self._since = "", math.nan
         self._stamp = 0.0  # [s] of the last frame
         self._consider = consider or self._check
@@ -186,6 +187,8 @@ class JobIntake:
             )
         elif not self._owner.busy and not message.plan_ready:
             self._keeper.end()
+            if self._dropped is not None:
+                self._tell_of(self._dropped)
         nanoseconds = round(1e9 * seconds)
         message.header.frame_id = FRAME
         message.header.stamp.sec = nanoseconds // 1_000_000_000
@@ -197,6 +200,7 @@ class JobIntake:
 
     def keep(self, task: Task) -> None:
         """A task begins that did not come as a goal."""
+        self._dropped = None
         goal = bytes(serialize_message(self._state.goal))
         self._keeper.begin(int(self._state.job), goal, task.targets, task.times)
 
@@ -229,6 +233,7 @@ class JobIntake:
             targets = tuple(np.array(t) for t in job.targets)
             self._goal = targets[-1]
             goal = bytes.fromhex(job.goal)
+            self._dropped = None
             self._keeper.begin(job.job, goal, targets, job.times, job.plan_only)
             self._owner.resume(job)
 
@@ -254,11 +259,17 @@ class JobIntake:
         """The job that was under way ends without having been taken up."""
         self._keeper.end()
         self._node.get_logger().warning(str(refusal))
+        self._dropped, state = refusal, self._state
+        self._tell_of(refusal)
+        self._state_publisher.publish(state)
+        self._text_publisher.publish(String(data=f"{state.state_name}: {state.reason}"))
+
+    def _tell_of(self, refusal: GoalRefused) -> None:
+        """The owner knows nothing of a job that was not taken up: what it says of itself, before
+        and after, is not how that job ended."""
         state = self._state
         state.state, state.state_name = int(JobPhase.IDLE), JobPhase.IDLE.name
         state.reason, state.error_code = str(refusal), int(refusal.code)
-        self._state_publisher.publish(state)
-        self._text_publisher.publish(String(data=f"{state.state_name}: {state.reason}"))
 
     def _on_run(self, message: String) -> None:
         self._run = str(message.data)
@@ -354,7 +365,7 @@ class JobIntake:
             self._state_publisher.publish(self._state)
             return
         self._use(item)
-        self._goal = goal
+        self._goal, self._dropped = goal, None
         self._state.job += 1
         kept = bytes(serialize_message(message))
         self._keeper.begin(int(self._state.job), kept, (goal,), plan_only=plan_only)

@@ -1,6 +1,7 @@
 """Goals at the door: FAULTS 2, 3, 22, 28, whoever the owner of the job is."""
 
 import math
+import os
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import rclpy
 from action_msgs.msg import GoalStatus
 from geometry_msgs.msg import PoseStamped
 from rclpy.action import ActionClient
+from rclpy.serialization import serialize_message
 from std_srvs.srv import Trigger
 
 from push_model.jobs import GoalRefused, JobError
@@ -16,6 +18,7 @@ from push_msgs.msg import JobState
 from push_ros.conversions import pose_stamped_to_ros
 from push_ros.diagnostics import Diagnostics
 from push_ros.job_intake import JobIntake
+from push_ros.job_memory import JobMemory, KeptJob, new_memory
 from push_ros.names import Names
 from push_ros.process import Spinner
 from push_ros.qos import COMMAND, LATCHED
@@ -258,3 +261,29 @@ def test_a_plan_that_is_not_to_be_executed_is_refused_where_nobody_can_make_it(r
     assert client.spinner.until(lambda: client.state.refusals == 1, 15.0)
     assert client.owner.busy and len(client.owner.taken) == 1  # the job goes on
     client.spinner.close()
+
+
+def test_how_a_job_that_was_not_taken_up_ended_is_told_until_the_next_one(ros):
+    """The owner, which knows nothing of it, says that it waits, for example when the map comes."""
+    file = new_memory()
+    goal = bytes(serialize_message(pose_stamped_to_ros(GOAL, 0.0))).hex()
+    JobMemory(file).write(KeptJob(("box", "epuck1"), 7, goal, (tuple(GOAL),)))
+    client = Client(Owner(memory=JobMemory(file)))
+    assert client.spinner.until(lambda: client.state.state_name == "PLANNING", 15.0)
+    assert client.state.job == 7
+    cancel = client.node.create_client(Trigger, "/red/cancel")
+    assert client.spinner.until(cancel.service_is_ready, 15.0)
+    called = cancel.call_async(Trigger.Request())
+    assert client.spinner.until(called.done, 15.0) and called.result().success
+    before = len(client.states)
+    client.owner.say("IDLE")
+    assert client.spinner.until(lambda: len(client.states) > before, 15.0)
+    assert client.state.state_name == "IDLE" and client.state.reason == "canceled"
+    assert client.state.error_code == JobError.CANCELED
+    client.publish(GOAL)
+    assert client.owner.busy and client.state.job == 8
+    client.owner.end_job(JobError.NONE, "done")
+    assert client.spinner.until(lambda: client.state.state_name == "IDLE", 15.0)
+    assert client.state.error_code == JobError.NONE
+    client.spinner.close()
+    os.close(file)
