@@ -186,7 +186,7 @@ class Belief:
             self, values={**self.values, **values}, outlines={**self.outlines, **corners}
         )
         try:
-            for body in {b for b, _ in values} | set(corners):
+            for body in dict.fromkeys([*(b for b, _ in values), *corners]):
                 if body in self.objects:
                     _ = made.object(body).geometry
         except (SettingsError, ValueError) as error:

@@ -138,7 +138,7 @@ class OutlineNode(Node):
             return
         if frame.verdict is not Stamp.OK:
             self.learner.interrupted()
-        seen = {n: p for n in frame.seen if (p := self._poses.pose(n)) is not None}
+        seen = dict(frame.seen)
         item = seen.pop(self.object, None)
         if item is None:
             return

@@ -23,12 +23,12 @@ from push_ros.validation import FRAME, InvalidMessage
 
 @dataclass(frozen=True)
 class Frame:
-    """stamp: of the message; verdict on it; seen: bodies whose pose was accepted; elapsed [s] since
-    the frame before, 0 where that is not known."""
+    """stamp: of the message; verdict on it; seen: accepted poses ``(3,)`` by name, in the order of
+    the message; elapsed [s] since the frame before, 0 where that is not known."""
 
     stamp: Any
     verdict: Stamp
-    seen: frozenset[str]
+    seen: Mapping[str, Array]
     elapsed: float
 
 
@@ -130,7 +130,7 @@ class PoseFeed:
             return
         before = self.gate.stamp
         verdict = self.gate.begin(time_from_ros(message.header.stamp))
-        seen: frozenset[str] = frozenset()
+        seen: dict[str, Array] = {}
         if verdict is Stamp.REFUSED:
             self._diagnostics.refuse(self.topic, self.gate.refusal)
         else:
@@ -138,7 +138,7 @@ class PoseFeed:
             for text in refused:
                 self.gate.refused += 1
                 self._diagnostics.refuse(self.topic, text)
-            seen = frozenset(name for name, pose in poses.items() if self.gate.accept(name, pose))
+            seen = {name: pose for name, pose in poses.items() if self.gate.accept(name, pose)}
             if message.names != self._names:
                 self._names = list(message.names)
                 self.gate.admit(self._meet(self._names))

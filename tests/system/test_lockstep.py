@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import cache
 
 import numpy as np
 import pytest
@@ -22,9 +23,10 @@ from push_msgs.msg import JobState
 from push_ros import pace_feed
 from push_ros.conversions import pose_stamped_to_ros
 from push_ros.qos import COMMAND, LATCHED
-from push_scenario.scenario import load_scenario
+from push_scenario.scenario import load_scenario, scenario_from_mapping
 from push_study.graph_run import LockstepRun
 from push_study.observer import final_errors
+from tests.system import test_group, test_swarm
 from tests.system.motion import drift, moved
 from tf2_msgs.msg import TFMessage
 
@@ -37,27 +39,41 @@ NODE_MODULES = (
     "sim_bridge.node",
     "push_ros.command_intake",
 )
-"""Where the nodes of one robot look at the wall clock, but the planner's."""
+"""Where nodes look at the wall clock, but the planner's."""
+TEAMS = {
+    "group": ("group", {}),
+    "swarm": ("swarm", {}),
+    "swarm that learns the outline": (
+        "swarm",
+        {"outline_estimator": {"enabled": True, "radius": 0.2}},
+    ),
+    "own sensing": ("own-sensing", {"own-sensing": {"orientation": False}}),
+}
+"""Systems, and parameters of their nodes."""
+RUNS = ("single", *(pytest.param(name, marks=pytest.mark.long) for name in TEAMS))
 
 
-def noisy(name="short", seed=3):
-    return (
-        load_scenario(name)
-        .settings(
-            "bridge",
-            seed=seed,
-            motion_capture__position_noise=2e-4,
-            motion_capture__orientation_noise=1.7e-3,
-            motion_capture__latency=0.01,
-        )
-        .settings("controller", tracker__pose_delay=0.01)
-    )
+def noisy(name="single", seed=3):
+    if name == "single":
+        scenario = load_scenario("short")
+    else:
+        system, parameters = TEAMS[name]
+        values = (test_group if system == "group" else test_swarm).VALUES
+        parameters = {**values["parameters"], **parameters}
+        scenario = scenario_from_mapping({**values, "parameters": parameters}, "test", "test")
+    return scenario.settings(
+        "bridge",
+        seed=seed,
+        motion_capture__position_noise=2e-4,
+        motion_capture__orientation_noise=1.7e-3,
+        motion_capture__latency=0.01,
+    ).settings("controller", tracker__pose_delay=0.01)
 
 
-def run_once(seed=3):
+def run_once(name="single", seed=3):
     """Digest of the ground truth of a whole noisy run."""
-    scenario = noisy(seed=seed)
-    with LockstepRun(scenario, quiet=True) as run:
+    scenario, system = noisy(name, seed), TEAMS.get(name, (name,))[0]
+    with LockstepRun(scenario, system=system, quiet=True) as run:
         run.start()
         state = run.reach(scenario.goal)
         trace = run.observer.trace
@@ -67,27 +83,34 @@ def run_once(seed=3):
         return hashlib.sha256(data).hexdigest()
 
 
-@pytest.fixture(scope="module")
-def undisturbed():
+@cache
+def undisturbed(name="single"):
     """Digest of a run that nothing disturbs."""
-    return run_once()
+    return run_once(name)
 
 
 @pytest.mark.long
-def test_equal_seeds_give_equal_runs_to_the_bit_also_in_a_fresh_process(undisturbed):
-    here = undisturbed
-    assert here == run_once()
-    code = "from tests.system.test_lockstep import run_once; print(run_once())"
+def test_equal_seeds_give_equal_runs_to_the_bit():
+    assert undisturbed() == run_once()
+    assert undisturbed() != run_once(seed=4)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["single", *TEAMS])
+def test_equal_seeds_give_equal_runs_to_the_bit_in_another_process(name):
+    """There, sets of names have another order."""
+    here = undisturbed(name)
+    code = f"from tests.system.test_lockstep import run_once; print(run_once({name!r}))"
     out = subprocess.run(
         [sys.executable, "-c", code],
         cwd=ROOT,
+        env={**os.environ, "PYTHONHASHSEED": "7"},
         capture_output=True,
         text=True,
         check=True,
         timeout=300,
     )
     assert out.stdout.split()[-1] == here
-    assert run_once(seed=4) != here
 
 
 def test_a_map_of_map_server_is_an_environment(room):
@@ -176,9 +199,10 @@ def test_all_nodes_know_that_the_world_waits_before_it_moves():
         assert all(c.told and c.lockstep for c in feeds)
 
 
-def test_a_wall_clock_that_leaps_changes_nothing(monkeypatch, undisturbed):
+@pytest.mark.parametrize("name", RUNS)
+def test_a_wall_clock_that_leaps_changes_nothing(monkeypatch, name):
     """FAULTS 30: each look at the wall clock finds that 20 s have passed, more than any limit."""
-    leaps = [0]
+    before, leaps = undisturbed(name), [0]
 
     class Leaping:
         thread_time, perf_counter = time.thread_time, time.perf_counter
@@ -190,12 +214,13 @@ def test_a_wall_clock_that_leaps_changes_nothing(monkeypatch, undisturbed):
 
     for module in NODE_MODULES:
         monkeypatch.setattr(f"{module}.time", Leaping)
-    assert run_once() == undisturbed
+    assert run_once(name) == before
     assert leaps[0] > 1000
 
 
 @pytest.mark.long
-def test_a_process_that_is_stopped_for_15_s_ends_as_one_that_was_not(undisturbed, tmp_path):
+@pytest.mark.parametrize("name", ["single", "group", "swarm"])
+def test_a_process_that_is_stopped_for_15_s_ends_as_one_that_was_not(name, tmp_path):
     """FAULTS 30: SIGSTOP in the middle of a push, SIGCONT; the result is equal to the bit."""
     code = (
         "from pathlib import Path\n"
@@ -204,12 +229,12 @@ def test_a_process_that_is_stopped_for_15_s_ends_as_one_that_was_not(undisturbed
         "class Marked(LockstepRun):\n"
         "    def spin_until(self, condition, limit, *rest):\n"
         "        def watched():\n"
-        "            if self.observer.state.state_name == 'PUSHING':\n"
+        f"            if self.observer.state.state == {JobState.PUSHING}:\n"
         f"                Path({str(tmp_path)!r}, 'pushing').touch()\n"
         "            return condition()\n"
         "        return super().spin_until(watched, limit, *rest)\n"
         "test_lockstep.LockstepRun = Marked\n"
-        "print(test_lockstep.run_once())\n"
+        f"print(test_lockstep.run_once({name!r}))\n"
     )
     process = subprocess.Popen(
         [sys.executable, "-c", code], cwd=ROOT, stdout=subprocess.PIPE, text=True
@@ -226,7 +251,7 @@ def test_a_process_that_is_stopped_for_15_s_ends_as_one_that_was_not(undisturbed
         out, _ = process.communicate(timeout=240.0)
     finally:
         process.kill()
-    assert process.returncode == 0 and out.split()[-1] == undisturbed
+    assert process.returncode == 0 and out.split()[-1] == undisturbed(name)
 
 
 def test_a_second_run_in_the_same_domain_is_refused():
