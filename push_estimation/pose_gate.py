@@ -6,11 +6,10 @@ beyond ``timeout`` counts as an interruption of the stream. One that lies back b
 it counts as a reset of the clock, or as an interruption.
 """
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass
 from enum import Enum
-
-import numpy as np
 
 from push_model import se2
 from push_model.arrays import Array
@@ -131,7 +130,7 @@ class PoseGate:
     def begin(self, stamp: float) -> Stamp:
         """Judge the stamp [s] of a frame; ``accept`` is for the poses of accepted frames only."""
         s = self.settings
-        if not np.isfinite(stamp) or stamp <= 0.0:
+        if not math.isfinite(stamp) or stamp <= 0.0:
             return self._refuse(f"its stamp is {stamp:g}")
         ahead = stamp - self.stamp
         verdict = Stamp.OK
@@ -166,7 +165,7 @@ class PoseGate:
         """Offer a pose ``(3,)`` of this frame; False when it is refused, gated or not wanted."""
         if self.bodies is not None and name not in self.bodies:
             return False
-        if not np.isfinite(pose).all():
+        if not all(map(math.isfinite, pose.tolist())):
             self.refused += 1
             return False
         body = self._bodies.get(name)
@@ -192,8 +191,8 @@ class PoseGate:
 
     def _close(self, first: Array, second: Array, elapsed: float) -> bool:
         s = self.settings
-        way = float(np.hypot(*(second - first)[:2]))
-        turn = abs(se2.wrap(float(second[2] - first[2])))
+        (x, y, heading), (x2, y2, heading2) = first.tolist(), second.tolist()
+        way, turn = math.hypot(x2 - x, y2 - y), abs(se2.wrap(heading2 - heading))
         return (
             way <= s.max_speed * elapsed + s.jump_margin
             and turn <= s.max_turn_rate * elapsed + s.turn_margin

@@ -24,6 +24,8 @@ from push_msgs.msg import PushSegment as SegmentMessage
 from push_msgs.msg import Trajectory as TrajectoryMessage
 from push_ros.validation import FARTHEST, FRAME, InvalidMessage, check_frame, finite, planar_pose
 
+_PLAIN = np.array([FARTHEST, FARTHEST, math.pi])  # [m], [m], [rad]: poses that need no closer look
+
 
 def time_to_ros(seconds: float) -> Time:
     """[s] to a stamp."""
@@ -75,13 +77,18 @@ def poses_from_ros(
 
     wanted: names to look at; all, when None. Raises InvalidMessage when it is no frame at all.
     """
-    columns = [np.asarray(a, dtype=np.float64) for a in (message.x, message.y, message.theta)]
-    if {len(c) for c in columns} != {len(message.names)}:
+    names, columns = message.names, (message.x, message.y, message.theta)
+    if any(len(c) != len(names) for c in columns):
         raise InvalidMessage("the arrays of a Poses message must have the same length")
-    table = np.column_stack(columns)
+    table = np.empty((len(names), 3))
+    for k, column in enumerate(columns):
+        table[:, k] = column
+    if (np.abs(table) <= _PLAIN).all() and len(set(names)) == len(names):
+        found = zip(names, table, strict=True)
+        return {n: p for n, p in found if wanted is None or n in wanted}, []
     poses: dict[str, Array] = {}
     refused = []
-    for name, pose in zip(message.names, table, strict=True):
+    for name, pose in zip(names, table, strict=True):
         if wanted is not None and name not in wanted:
             continue
         if not math.isfinite(pose.sum()) or abs(pose[2]) > FARTHEST:

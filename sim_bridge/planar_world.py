@@ -80,7 +80,8 @@ class PlanarWorld:
         self._parts, self._near, self._largest = tables.parts, tables.near, tables.largest
         self._contacts, self._sums = make_contacts(tables.room), make_sums(tables.room)
         self._drives = [robot.drive for robot, _ in robots.values()]
-        self._fastest = np.array([(d.max_speed, d.max_turn_rate) for d in self._drives])
+        self._unlike = [d for k, d in enumerate(self._drives) if d not in self._drives[:k]]
+        self._kind_of_drive = np.array([self._unlike.index(d) for d in self._drives])
         self._dead: set[str] = set()
         self.reset()
 
@@ -170,17 +171,10 @@ class PlanarWorld:
         if self._dead:
             alive = np.array([robot not in self._dead for robot in robots], dtype=np.bool_)
             rows, twists = rows[alive], twists[alive]
-        free = b.kind[rows] == HOLONOMIC
-        discs = rows[free]
-        if len(discs):
-            wanted, most = twists[free], self._fastest[discs]
-            need = np.maximum(
-                np.hypot(wanted[:, 0], wanted[:, 1]) / most[:, 0], np.abs(wanted[:, 2]) / most[:, 1]
-            )
-            b.target[discs] = wanted / np.maximum(need, 1.0)[:, None]
-            b.own_frame[discs] = not fixed_frame
-        for row, twist in zip(rows[~free].tolist(), twists[~free].tolist(), strict=True):
-            self._command_one(row, twist, fixed_frame)
+        for k, drive in enumerate(self._unlike):
+            mine = self._kind_of_drive[rows] == k
+            b.target[rows[mine]] = drive.saturate_all(twists[mine])
+        b.own_frame[rows[b.kind[rows] == HOLONOMIC]] = not fixed_frame
 
     def _command_one(self, row: int, twist: Sequence[float], fixed_frame: bool) -> None:
         target, drive = self._bodies.target[row], self._drives[row]
@@ -223,21 +217,16 @@ class PlanarWorld:
         """Contacts since the last reading, averaged over its steps."""
         sums, bodies = self._sums, len(self._all)
         rows, steps = int(sums.number[0]), int(sums.number[1])
-        found = []
-        for key, v in zip(sums.keys[:rows].tolist(), sums.values[:rows], strict=True):
+        v, found = sums.values[:rows], []
+        places, normals, forces = np.zeros((3, rows, 3))
+        places[:, :2] = v[:, 2:4] / v[:, 6:7]
+        normals[:, :2] = v[:, 4:6] / np.maximum(np.hypot(v[:, 4], v[:, 5]), 1e-12)[:, None]
+        forces[:, :2] = v[:, :2] / steps if rows else 0.0
+        duties = (v[:, 7] / max(steps, 1)).tolist()
+        for k, key in enumerate(sums.keys[:rows].tolist()):
             a, other = key >> 32, key & 0xFFFFFFFF
             name = self._all[other] if other < bodies else self._fixed_names[other - bodies]
-            push = math.hypot(v[4], v[5])
-            found.append(
-                Contact(
-                    self._all[a],
-                    name,
-                    np.array([v[2] / v[6], v[3] / v[6], 0.0]),
-                    np.array([v[4], v[5], 0.0]) / max(push, 1e-12),
-                    np.array([v[0], v[1], 0.0]) / steps,
-                    float(v[7]) / steps,
-                )
-            )
+            found.append(Contact(self._all[a], name, places[k], normals[k], forces[k], duties[k]))
         self._clear_sums()
         return found
 
