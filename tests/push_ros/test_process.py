@@ -1,5 +1,6 @@
 """Who hears a publisher; what a process holds, and gives back."""
 
+import gc
 import io
 import os
 import signal
@@ -177,14 +178,41 @@ def test_a_claim_ends_with_its_process_and_one_of_another_user_counts(domain, tm
     assert not world_is_claimed(name, "/")
 
 
+@pytest.fixture
+def signals():
+    """Handlers of signals are put back."""
+    before = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+def test_what_exists_when_a_node_begins_is_not_collected_while_it_runs(signals):
+    """A full collection takes 0.1 s, and a controller has 20 ms."""
+    frozen = []
+
+    def end():
+        frozen.append(gc.get_freeze_count())
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    def make():
+        node = rclpy.create_node("timed")
+        node.create_timer(0.02, end)
+        return node
+
+    assert run_node(make, []) == 0
+    assert frozen[0] > 10_000 and gc.get_freeze_count() == 0
+
+
 @pytest.mark.parametrize("in_real_time", [True, False])
-def test_a_node_runs_where_no_real_time_priority_is_permitted(monkeypatch, capfd, in_real_time):
+def test_a_node_runs_where_no_real_time_priority_is_permitted(
+    monkeypatch, capfd, signals, in_real_time
+):
     """The bridge says so in one line; in lockstep it asks for none."""
 
     def refuse(*_):
         raise PermissionError(1, "Operation not permitted")
 
-    before = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)}
     monkeypatch.setattr(os, "sched_setscheduler", refuse)
     asked = []
 
@@ -201,11 +229,7 @@ def test_a_node_runs_where_no_real_time_priority_is_permitted(monkeypatch, capfd
         node.create_timer(0.02, lambda: os.kill(os.getpid(), signal.SIGTERM))
         return node
 
-    try:
-        assert run_node(make, [], Urgency.WORLD) == 0
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    assert run_node(make, [], Urgency.WORLD) == 0
     assert asked == [Urgency.WORLD if in_real_time else Urgency.ORDINARY]
     said = capfd.readouterr()
     assert (said.out + said.err).count("no real-time priority") == in_real_time
