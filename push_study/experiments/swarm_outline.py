@@ -37,7 +37,9 @@ OPTIONS = {"uncertainty": "mild", "world": "planar"}
 BELIEVED: dict[str, float | None] = {
     "-20 %": 0.8,
     "-10 %": 0.9,
+    "-5 %": 0.95,
     "exact": 1.0,
+    "+5 %": 1.05,
     "+10 %": 1.1,
     "+20 %": 1.2,
     "disc": None,
