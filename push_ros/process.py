@@ -20,19 +20,28 @@ from rclpy.experimental import EventsExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from threadpoolctl import threadpool_limits
 
 from push_model.settings import SettingsError
 from push_ros.scheduling import RealTimePriority, Urgency, go_to_background
 
 
 def prepare_environment(environment: dict[str, str] | None = None) -> dict[str, str]:
-    """Defaults for a suite on one machine: local discovery, quick, one BLAS thread."""
+    """Defaults for a suite on one machine: local discovery, quick, one BLAS thread.
+
+    environment: of other processes; that of this one when it is not given. How BLAS rounds depends
+    on its number of threads, and with it whether equal seeds give equal runs on all machines. In
+    this process, libraries that have been loaded before therefore change their number, too.
+    """
     env = os.environ if environment is None else environment
     env.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     env.setdefault("OPENBLAS_NUM_THREADS", "1")
     env.setdefault("RCUTILS_LOGGING_USE_STDOUT", "0")
     profile = Path(__file__).parent / "discovery.xml"
     env.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(profile))
+    threads = env["OPENBLAS_NUM_THREADS"]
+    if environment is None and threads.isdecimal() and int(threads) > 0:
+        threadpool_limits(int(threads), "blas")
     return env  # type: ignore[return-value]
 
 

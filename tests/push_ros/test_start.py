@@ -3,6 +3,7 @@
 import os
 import signal
 import subprocess
+import sys
 import time
 
 import pytest
@@ -30,3 +31,22 @@ def test_a_module_that_cannot_be_loaded_says_so(domain):
         command_of("push_planner.atlantis", []), capture_output=True, text=True, check=False
     )
     assert done.returncode != 0 and "atlantis" in done.stderr
+
+
+@pytest.mark.parametrize("given", ["", "2"])
+def test_blas_that_was_loaded_before_has_one_thread_or_as_many_as_are_asked_for(given):
+    """With more, it rounds in another way, and runs of equal seeds differ between machines."""
+    code = (
+        "import numpy, scipy.linalg\n"
+        "from push_ros.process import prepare_environment\n"
+        "from threadpoolctl import threadpool_info\n"
+        "prepare_environment()\n"
+        "print(*(i['num_threads'] for i in threadpool_info() if i['user_api'] == 'blas'))\n"
+    )
+    environment = {k: v for k, v in os.environ.items() if k != "OPENBLAS_NUM_THREADS"}
+    environment |= {"OPENBLAS_NUM_THREADS": given} if given else {}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
+    )
+    threads = done.stdout.split()
+    assert len(threads) >= 2 and set(threads) == {given or "1"}
