@@ -1,15 +1,14 @@
 """Exact geometry of an environment: whether a body is free in it, and distances of points."""
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.ndimage import distance_transform_edt
 
 from push_model import se2
 from push_model.arrays import Array
 from push_model.bumpers import RingBumper
+from push_model.distance_field import DistanceField
 from push_model.occupancy import MapSpec
 from push_model.outlines import cells_hit, distance, inside, overlap, overlaps_disc
 from push_model.specs import BoxSpec, EnvironmentSpec, ObjectSpec, RobotSpec
@@ -108,22 +107,14 @@ class Room:
                 away[inside(obstacle.outline, points)] = 0.0
             least = np.minimum(least, away)
         if isinstance(self._environment, MapSpec):
-            grid = self._environment.grid
-            cells = np.floor((points - grid.origin) / grid.resolution).astype(np.int64)
-            columns = np.clip(cells[:, 0], 0, grid.occupied.shape[1] - 1)
-            rows = np.clip(cells[:, 1], 0, grid.occupied.shape[0] - 1)
-            least = np.minimum(least, self._cell_distance[rows, columns])
+            least = np.minimum(least, [self._field.at(x, y) for x, y in points])
         clear: Array = np.maximum(least, 0.0)
         return clear
 
     @cached_property
-    def _cell_distance(self) -> Array:
-        """[m] lower bound of the distance from a cell to the nearest occupied one."""
+    def _field(self) -> DistanceField:
         assert isinstance(self._environment, MapSpec)
-        grid = self._environment.grid
-        between_centres = distance_transform_edt(~grid.occupied)
-        away: Array = (between_centres - math.sqrt(2.0)) * grid.resolution
-        return away
+        return DistanceField(self._environment.grid)
 
     def _in_cells(self, body: Footprint, low: Array, high: Array, touch: float) -> bool:
         assert isinstance(self._environment, MapSpec)

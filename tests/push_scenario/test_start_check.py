@@ -8,6 +8,7 @@ import pytest
 from PIL import Image
 
 from push_model import SettingsError, se2
+from push_model.occupancy import MapSpec, OccupancyGrid
 from push_model.outlines import distance, inside
 from push_model.specs import EnvironmentSpec, ObjectSpec
 from push_scenario.room import Room, object_footprint
@@ -162,6 +163,20 @@ def test_clearance_is_never_more_than_the_way_to_a_wall(tmp_path):
             at = point + 0.999 * max(free - 2e-4, 0.0) * np.array([math.cos(a), math.sin(a)])
             if free > 1e-3:
                 assert room.trouble(object_footprint("", probe, se2.pose(*at, 0.0))) is None
+
+
+def test_clearance_on_a_map_is_that_of_its_cells():
+    """Never more, and at most a hair less than half a cell."""
+    random, size = np.random.default_rng(5), 0.05
+    occupied = random.random((40, 60)) < 0.03
+    grid = OccupancyGrid(occupied, size, np.array([-1.5, -1.0]))
+    points = random.uniform([-1.5, -1.0], [1.5, 1.0], (500, 2))
+    corners = np.argwhere(occupied)[:, ::-1] * size + grid.origin
+    nearest = np.clip(points[:, None], corners, corners + size)
+    exact = np.hypot(*(points[:, None] - nearest).transpose(2, 0, 1)).min(axis=1)
+    edges = np.minimum(points + [1.5, 1.0], [1.5, 1.0] - points).min(axis=1)
+    lost = np.minimum(exact, edges) - Room(MapSpec(grid, 0.1, 0.3)).clearance(points)
+    assert lost.min() > -1e-6 and lost.max() < 0.5 * size
 
 
 def test_a_thousand_discs_are_checked_pair_by_pair():
