@@ -34,7 +34,7 @@ from push_study.statistics import sign_test
 from push_study.study import StudyOptions
 from push_study.summary import by_cell
 from push_study.team_run import TeamTrace, made_scenario, run_team
-from push_study.uncertainty import uncertainty
+from push_study.uncertainty import Uncertainty, uncertainty
 
 SCENARIOS = ("bend", "double-bend", "wave")
 """Trajectories, where none are named."""
@@ -76,6 +76,17 @@ class TrackingTask:
     placement: str
     world: str
     uncertainty: str
+
+    @property
+    def doubt(self) -> Uncertainty:
+        """What the nodes do not know."""
+        return uncertainty(self.uncertainty)
+
+    @property
+    def trace(self) -> Path:
+        """Where its push is kept."""
+        name = f"{self.scenario}-{self.robots}-{self.placement}-{self.seed}.npz"
+        return Path(self.out) / "pushes" / name
 
 
 def tasks(options: StudyOptions) -> list[TrackingTask]:
@@ -131,7 +142,7 @@ def trial(task: TrackingTask) -> Row:
         given_grasp.NAME,
         scenario,
         task_along(path, item),
-        uncertainty(task.uncertainty),
+        task.doubt,
         task.seed,
         path.duration + _LONGER,
         record,
@@ -167,13 +178,8 @@ def _keep(task: TrackingTask, record: PushRecord, trace: TeamTrace) -> None:
         "wanted": np.array(record.wanted),
         "force": record.forces(trace),
     }
-    _trace_file(task).parent.mkdir(parents=True, exist_ok=True)
-    np.savez_compressed(_trace_file(task), **arrays)
-
-
-def _trace_file(task: TrackingTask) -> Path:
-    name = f"{task.scenario}-{task.robots}-{task.placement}-{task.seed}.npz"
-    return Path(task.out) / "pushes" / name
+    task.trace.parent.mkdir(parents=True, exist_ok=True)
+    np.savez_compressed(task.trace, **arrays)
 
 
 def statistics(rows: list[Row]) -> dict[str, Any]:
@@ -254,7 +260,7 @@ def _plots(tasks: Sequence[TrackingTask], options: StudyOptions) -> None:
                 t
                 for t in tasks
                 if (t.scenario, t.robots, t.seed) == (name, count, options.seed)
-                and _trace_file(t).is_file()
+                and t.trace.is_file()
             ]
             if mine:
                 _figure(f"{name}-{count}", mine, options)
@@ -263,7 +269,7 @@ def _plots(tasks: Sequence[TrackingTask], options: StudyOptions) -> None:
 def _figure(name: str, tasks: Sequence[TrackingTask], options: StudyOptions) -> None:
     figure, axes = plt.subplots(1, 3, figsize=(13, 3.6))
     for task, style in zip(tasks, ("-", "--"), strict=False):
-        trace = np.load(_trace_file(task))
+        trace = np.load(task.trace)
         label = f"{task.placement} places"
         axes[0].plot(*trace["object"][:, :2].T, style, label=label)
         off = 1e3 * np.hypot(*(trace["object"] - trace["wanted"])[:, :2].T)
