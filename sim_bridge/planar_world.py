@@ -216,13 +216,13 @@ class PlanarWorld:
     def read_contacts(self) -> list[Contact]:
         """Contacts since the last reading, averaged over its steps."""
         sums, bodies = self._sums, len(self._all)
-        rows, steps = int(sums.number[0]), int(sums.number[1])
+        rows, steps = int(sums.number[0]), max(1, int(sums.number[1]))
         v, found = sums.values[:rows], []
         places, normals, forces = np.zeros((3, rows, 3))
         places[:, :2] = v[:, 2:4] / v[:, 6:7]
         normals[:, :2] = v[:, 4:6] / np.maximum(np.hypot(v[:, 4], v[:, 5]), 1e-12)[:, None]
-        forces[:, :2] = v[:, :2] / steps if rows else 0.0
-        duties = (v[:, 7] / max(steps, 1)).tolist()
+        forces[:, :2] = v[:, :2] / steps
+        duties = (v[:, 7] / steps).tolist()
         for k, key in enumerate(sums.keys[:rows].tolist()):
             a, other = key >> 32, key & 0xFFFFFFFF
             name = self._all[other] if other < bodies else self._fixed_names[other - bodies]
