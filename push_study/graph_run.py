@@ -87,6 +87,7 @@ class LockstepRun:
         namespace: str = "",
         record: Path | None = None,
         about: Mapping[str, str] | None = None,
+        observe_bodies: bool = True,
     ) -> None:
         """Make the nodes.
 
@@ -100,6 +101,7 @@ class LockstepRun:
         system: which nodes, see ``push_bringup.systems``. namespace: of the world.
         record: folder of a bag from which ``planar-push rerun`` can repeat the run.
         about: further metadata of that bag.
+        observe_bodies: whether the observer keeps poses and contacts; without, its trace is empty.
 
         Raises
         ------
@@ -136,7 +138,7 @@ class LockstepRun:
                 parts = {s.kind: s for s in specs if s.kind != "bridge" and s.team == team.name}
                 owner = next(part for part in parts.values() if part.traits.owner)
                 names = Names(space(namespace), space(owner.namespace))
-                observer = Observer(names, team.robots, team.object)
+                observer = Observer(names, team.robots, team.object, observe_bodies)
                 nodes.append(observer)
                 self.teams[team.name] = _team_run(made, parts, observer)
             nodes.extend(extra() if extra else [])

@@ -34,8 +34,9 @@ class Trace:
 class Observer(Node):
     """Watches a run from ground truth. For evaluation only: it commands nothing but the goal."""
 
-    def __init__(self, names: Names, robots: Sequence[str], item: str) -> None:
-        """robots: of the team; what is kept of one robot is of the first."""
+    def __init__(self, names: Names, robots: Sequence[str], item: str, bodies: bool = True) -> None:
+        """robots: of the team; what is kept of one robot is of the first. bodies: whether poses and
+        contacts are observed, not only what nodes say."""
         super().__init__("observer", namespace=names.team_space.rstrip("/"))
         self.names = names
         robot = robots[0]
@@ -47,8 +48,9 @@ class Observer(Node):
         self._poses: dict[str, Array] = {}
         self._truth_topic = names.world("ground_truth/poses")
         status = names.robot(robot, "controller/status")
-        self.create_subscription(Poses, self._truth_topic, self._on_truth, STREAM)
-        self.create_subscription(Contacts, names.world("contacts"), self._on_contacts, STREAM)
+        if bodies:
+            self.create_subscription(Poses, self._truth_topic, self._on_truth, STREAM)
+            self.create_subscription(Contacts, names.world("contacts"), self._on_contacts, STREAM)
         self.create_subscription(JobState, names.team("job_state"), self._on_state, LATCHED)
         self.create_subscription(PushPlan, names.team("push_plan"), self._on_plan, LATCHED)
         self.create_subscription(ControllerStatus, status, self._on_status, STATUS)

@@ -267,7 +267,9 @@ def _run(
         watchers.append(made)
         return [made]
 
-    with LockstepRun(believed, observer, world=actual, quiet=True, system=system) as run:
+    with LockstepRun(
+        believed, observer, world=actual, quiet=True, system=system, observe_bodies=False
+    ) as run:
         run.start()
         node, watcher = run.supervisor, watchers[0]
         if not isinstance(node, MethodNode):

@@ -264,3 +264,11 @@ def test_a_second_run_in_the_same_domain_is_refused():
         assert run.spin_until(lambda: run.bridge.time > 0.1, 5.0), "the first one goes on"
     with LockstepRun(scenario, quiet=True):
         pass
+
+
+def test_an_observer_that_keeps_no_bodies_hears_the_job_alone():
+    with LockstepRun(load_scenario("short"), quiet=True, observe_bodies=False) as run:
+        run.start()
+        assert run.spin_until(lambda: run.bridge.time > 0.2, 5.0)
+        trace = run.observer.trace
+        assert run.observer.state is not None and not trace.time and not trace.object
