@@ -108,7 +108,7 @@ class TorqueFollower:
         return "" if self._pose(frame) is not None else self._robot
 
     def _pose(self, frame: Frame) -> Any:
-        return self._shell.poses.pose(self._robot) if self._robot in frame.seen else None
+        return frame.seen.get(self._robot)
 
     def tick(self, dt: float, frame: Frame) -> Followed:
         """See Follower."""

@@ -107,9 +107,7 @@ class EstimatorNode(Node):
         if frame.verdict is not Stamp.OK:
             self.estimates.interrupted()
             self._last = min(self._last, self._poses.stamp)
-        robot, item = (
-            self._poses.pose(n) if n in frame.seen else None for n in (self.robot, self.object)
-        )
+        robot, item = frame.seen.get(self.robot), frame.seen.get(self.object)
         if self.estimates.frame(self._poses.stamp, robot, item):
             self._publish(frame)
         self._tell()

@@ -265,8 +265,8 @@ class JobIntake:
         self._text_publisher.publish(String(data=f"{state.state_name}: {state.reason}"))
 
     def _tell_of(self, refusal: GoalRefused) -> None:
-        """The owner knows nothing of a job that was not taken up: what it says of itself, before
-        and after, is not how that job ended."""
+        """Write into the state how a job ended that was not taken up. The owner does not know of
+        that job, so its own words do not say it."""
         state = self._state
         state.state, state.state_name = int(JobPhase.IDLE), JobPhase.IDLE.name
         state.reason, state.error_code = str(refusal), int(refusal.code)

@@ -29,9 +29,9 @@ from push_ros.scheduling import RealTimePriority, Urgency, go_to_background
 def prepare_environment(environment: dict[str, str] | None = None) -> dict[str, str]:
     """Defaults for a suite on one machine: local discovery, quick, one BLAS thread.
 
-    environment: of other processes; that of this one when it is not given. How BLAS rounds depends
-    on its number of threads, and with it whether equal seeds give equal runs on all machines. In
-    this process, libraries that have been loaded before therefore change their number, too.
+    environment: of other processes; that of this one when it is not given. BLAS rounds differently
+    with another number of threads, so equal seeds would give other runs on a machine with other
+    cores. The number is therefore also set in the BLAS libraries that this process has loaded.
     """
     env = os.environ if environment is None else environment
     env.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
@@ -183,7 +183,7 @@ def _destroy(node: Node) -> None:
 def _spare_collections() -> None:
     """Take what exists now out of garbage collection: it lives as long as the process.
 
-    A collection of everything that the modules and the node have made takes about 0.1 s, in which a
+    A collection of everything that the modules and the node have made takes about 50 ms, in which a
     controller would miss some ticks.
     """
     gc.collect()

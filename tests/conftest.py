@@ -1,5 +1,7 @@
 """Shared by all tests: small scenarios, and ROS contexts that leave nothing behind."""
 
+import signal
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
@@ -44,6 +46,15 @@ def robot(scenario):
 @pytest.fixture(scope="session")
 def box(scenario):
     return scenario.object()[1]
+
+
+@pytest.fixture
+def signal_handlers():
+    """Handlers of SIGINT and SIGTERM are put back."""
+    before = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
 
 
 @pytest.fixture

@@ -21,10 +21,8 @@ from push_study.uncertainty import Uncertainty
 SCENARIOS = group_tracking.SCENARIOS
 """Trajectories, where none are named."""
 OPTIONS = {"uncertainty": "mild", "world": "planar"}
-LATENCIES = (0.0, 0.02, 0.05, 0.1)
-"""[s] latencies that the nodes know."""
-UNKNOWN = 0.1
-"""[s] latency of the runs in which the nodes take the poses for new."""
+CELLS = ((0.0, True), (0.02, True), (0.05, True), (0.1, True), (0.1, False))
+"""Latencies [s], and whether the nodes know them; otherwise they take the poses for new."""
 _MEASURES = ("position_error_m", "orientation_error_rad")
 
 
@@ -51,13 +49,12 @@ class LatencyTask(TrackingTask):
 
 def tasks(options: StudyOptions) -> list[LatencyTask]:
     """Every trajectory, number of robots and latency, with as many seeds as there are trials."""
-    even = [t for t in group_tracking.tasks(options) if t.placement == "even"]
-    cells = [*((latency, True) for latency in LATENCIES), (UNKNOWN, False)]
-    world = options.world or OPTIONS["world"]
+    options = replace(options, world=options.world or OPTIONS["world"])
     return [
-        LatencyTask(**{**vars(task), "world": world}, latency=latency, known=known)
-        for task in even
-        for latency, known in cells
+        LatencyTask(**vars(task), latency=latency, known=known)
+        for task in group_tracking.tasks(options)
+        for latency, known in CELLS
+        if task.placement == "even"
     ]
 
 
@@ -83,14 +80,14 @@ def _error(rows: list[Row], key: str) -> float:
 
 def statistics(rows: list[Row]) -> dict[str, Any]:
     """Mean errors by trajectory, number of robots, latency and whether it is known; the greatest
-    ratio to the errors without latency, over trajectories and numbers of robots."""
+    ratio of the position error to that without latency, over trajectories and numbers of robots."""
     result: dict[str, Any] = dict(
         by_cell(rows, ("scenario", "robots", "latency_s", "known"), _MEASURES)
     )
-    for latency, known in [*((late, True) for late in LATENCIES[1:]), (UNKNOWN, False)]:
+    for latency, known in CELLS[1:]:
         ratios = [
             _error(_mine(rows, name, count, latency, known), _MEASURES[0])
-            / _error(_mine(rows, name, count, 0.0, True), _MEASURES[0])
+            / _error(_mine(rows, name, count, *CELLS[0]), _MEASURES[0])
             for name in dict.fromkeys(r["scenario"] for r in rows)
             for count in ROBOTS
             if _mine(rows, name, count, latency, known)
@@ -103,15 +100,14 @@ def statistics(rows: list[Row]) -> dict[str, Any]:
 
 def conclude(options: StudyOptions, tasks: Sequence[LatencyTask], rows: list[Row]) -> None:
     """A line for each trajectory and number of robots: mean errors by latency."""
-    cells = [*((latency, True) for latency in LATENCIES), (UNKNOWN, False)]
-    titles = [f"{1e3 * late:.0f} ms" + ("" if known else " unknown") for late, known in cells]
+    titles = [f"{1e3 * late:.0f} ms" + ("" if known else " unknown") for late, known in CELLS]
     print("\nposition error [mm] (orientation error [rad]), means over the push, by latency")
     print("trajectory   robots  " + "".join(f"{title:>18s}" for title in titles))
     for name in options.scenarios:
         for count in ROBOTS:
-            cell = [_mine(rows, name, count, *c) for c in cells]
+            cells = [_mine(rows, name, count, *cell) for cell in CELLS]
             told = "".join(
                 f"{1e3 * _error(r, _MEASURES[0]):9.2f} ({_error(r, _MEASURES[1]):.4f})"
-                for r in cell
+                for r in cells
             )
             print(f"{name:13s}{count:5d}   {told}")

@@ -11,11 +11,8 @@ from planar_push import arguments
 
 
 @pytest.fixture
-def handlers():
-    before = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)}
+def handlers(signal_handlers):
     yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
     arguments._asked.clear()
 
 

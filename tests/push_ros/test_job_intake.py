@@ -275,9 +275,8 @@ def test_how_a_job_that_was_not_taken_up_ended_is_told_until_the_next_one(ros):
     assert client.spinner.until(cancel.service_is_ready, 15.0)
     called = cancel.call_async(Trigger.Request())
     assert client.spinner.until(called.done, 15.0) and called.result().success
-    before = len(client.states)
-    client.owner.say("IDLE")
-    assert client.spinner.until(lambda: len(client.states) > before, 15.0)
+    client.owner.intake.publish(2.0, state_name="IDLE", reason="waiting", error_code=0)
+    assert client.spinner.until(lambda: client.state.header.stamp.sec == 2, 15.0)
     assert client.state.state_name == "IDLE" and client.state.reason == "canceled"
     assert client.state.error_code == JobError.CANCELED
     client.publish(GOAL)

@@ -178,17 +178,8 @@ def test_a_claim_ends_with_its_process_and_one_of_another_user_counts(domain, tm
     assert not world_is_claimed(name, "/")
 
 
-@pytest.fixture
-def signals():
-    """Handlers of signals are put back."""
-    before = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)}
-    yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
-
-
-def test_what_exists_when_a_node_begins_is_not_collected_while_it_runs(signals):
-    """A full collection takes 0.1 s, and a controller has 20 ms."""
+def test_what_exists_when_a_node_begins_is_not_collected_while_it_runs(signal_handlers):
+    """A full collection takes about 50 ms, and a controller has 20 ms."""
     frozen = []
 
     def end():
@@ -206,7 +197,7 @@ def test_what_exists_when_a_node_begins_is_not_collected_while_it_runs(signals):
 
 @pytest.mark.parametrize("in_real_time", [True, False])
 def test_a_node_runs_where_no_real_time_priority_is_permitted(
-    monkeypatch, capfd, signals, in_real_time
+    monkeypatch, capfd, signal_handlers, in_real_time
 ):
     """The bridge says so in one line; in lockstep it asks for none."""
 

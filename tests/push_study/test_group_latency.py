@@ -14,7 +14,7 @@ def options(tmp_path, trials=1):
 
 def test_runs_differ_in_the_latency_alone(tmp_path):
     tasks = group_latency.tasks(options(tmp_path, 2))
-    assert len(tasks) == 2 * 2 * (len(group_latency.LATENCIES) + 1)
+    assert len(tasks) == 2 * 2 * len(group_latency.CELLS)
     assert len({t.trace for t in tasks}) == len(tasks)
     first = tasks[0].doubt
     for task in tasks:
@@ -27,7 +27,7 @@ def test_runs_differ_in_the_latency_alone(tmp_path):
 
 @pytest.mark.long
 def test_a_known_latency_costs_no_accuracy_and_an_unknown_one_does(tmp_path):
-    """With the nodes; in the study the ratio of the errors is at most 1.2 in every cell."""
+    """The ratio of position errors. Orientation errors may grow by 1 mrad."""
     tasks = [t for t in group_latency.tasks(options(tmp_path)) if t.robots == 2]
     rows = [group_latency.trial(t) for t in tasks]
     assert all(r["success"] and r["collision_ticks"] == 0 for r in rows)
@@ -35,4 +35,8 @@ def test_a_known_latency_costs_no_accuracy_and_an_unknown_one_does(tmp_path):
     for latency in ("20", "50", "100"):
         assert found[f"greatest_ratio_{latency}_ms_known"] <= 1.2
     assert found["greatest_ratio_100_ms_unknown"] > 2.0
+    turned = {
+        (t.latency, t.known): r["orientation_error_rad"] for t, r in zip(tasks, rows, strict=True)
+    }
+    assert all(turned[cell] < turned[0.0, True] + 1e-3 for cell in group_latency.CELLS if cell[1])
     assert [r["applied_latency_s"] for r in rows] == pytest.approx([t.latency for t in tasks])
