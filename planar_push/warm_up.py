@@ -21,6 +21,7 @@ def run(arguments: argparse.Namespace) -> int:
         "torque-driven robot": _torque,
         "placements of a group": _placements,
         "group and swarm": _methods,
+        "environments for learning, and a point pusher": _batches,
     }
     for number, (name, compile_part) in enumerate(parts.items(), 1):
         print(f"compiling the numerical functions, {number} of {len(parts)}: {name}", flush=True)
@@ -31,6 +32,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _one_robot() -> None:
     import numpy as np
 
+    from push_model.corner_push import corner_push, touching
     from push_mpc import LtvMpc, MpcSettings, TrackerSettings, TrajectoryTracker
     from push_planner import PlannerSettings, PushPlanner, warm_up
     from push_scenario.scenario import load_scenario
@@ -44,6 +46,8 @@ def _one_robot() -> None:
     goal = scenario.goal if scenario.goal is not None else np.zeros(3)
     warm_up(PlannerSettings(), robot, item)
     PushPlanner(PlannerSettings(), scenario.grid, robot, item).solve(start, goal)
+    corner = touching(item.outline, 0.4, 0.05, 0.0)
+    corner_push(item.outline, corner, 0.05, 0.03, item.contact_friction, 0.05, 0.1)
     with PlanarWorld(scenario.environment, scenario.robots, scenario.objects) as world:
         world.step(2)
 
@@ -85,6 +89,26 @@ def _methods() -> None:
         _begin(method, load_scenario(name))
     for name in ("own-sensing", "swarm-walls"):
         _begin(OWN_SENSING, load_scenario(name), turned=False)
+
+
+def _batches() -> None:
+    """A step of several planar worlds at once, and one of a disc that pushes."""
+    import numpy as np
+
+    from push_model.point_push import Disc, body, driven, gap, placed, push
+    from push_model.specs import EnvironmentSpec
+    from push_scenario.scenario import load_scenario
+    from sim_bridge.planar_batch import PlanarBatch
+
+    scenario = load_scenario("env1-target1")
+    (_, robot), (_, item) = scenario.robot(), scenario.object()
+    batch = PlanarBatch(2, EnvironmentSpec((1.0, 1.0)), [robot], [item])
+    batch.command(np.ones((2, 1, 3)))
+    batch.step(2)
+    box, disc = body(item.outline, 0.03), Disc(0.01, 100.0, 20.0, 0.01, 0.2, 1e-3)
+    gap(0.1, 0.0, placed(box, np.zeros(3)), box.first, box.count)
+    push(box, disc, np.zeros((1, 6)), np.full((1, 4), 0.05), np.zeros((1, 2)), 2)
+    driven(disc, np.zeros(4), np.ones(2), 1)
 
 
 def _begin(method: "MethodSpec", scenario: "Scenario", turned: bool = True) -> None:

@@ -2,13 +2,17 @@
 
 import gc
 
+import numpy as np
 import pytest
 from numba.core.dispatcher import Dispatcher
 
 from planar_push import warm_up
+from push_gym.vector_env import PlanarPushVectorEnv
 from push_job.method import Arena, Seen, Task, method_spec
 from push_model.belief import Belief
+from push_model.point_push import driven
 from push_scenario.scenario import load_scenario
+from push_study.experiments import pusht
 from sim_bridge.planar_world import PlanarWorld
 
 _STEP = 0.01  # [s]
@@ -53,3 +57,10 @@ def test_after_it_nothing_is_compiled():
     ):
         assert pushed(name, method, 20.0).phase > 0
         assert sorted(compiled() - before) == [], name
+    rooms = PlanarPushVectorEnv(2)
+    rooms.reset(seed=1)
+    rooms.step(np.ones(rooms.action_space.shape))
+    chooser = pusht.planner()
+    chooser.target(pusht.to_mass(np.array([0.3, 0.3, 0.5])), np.array([0.1, 0.1, 0.0, 0.0]))
+    driven(pusht.DISC, np.zeros(4), np.ones(2), 1)
+    assert sorted(compiled() - before) == []
