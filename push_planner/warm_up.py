@@ -8,6 +8,7 @@ import numpy as np
 from push_model.occupancy import OccupancyGrid
 from push_model.specs import ObjectSpec, RobotSpec
 from push_planner.arc_pushes import pushes_over_arcs
+from push_planner.cost_bound import CostBound
 from push_planner.planner import PushPlanner
 from push_planner.push_graph import SearchStatistics
 from push_planner.robot_path import NoRobotPath, plan_robot_path
@@ -34,6 +35,7 @@ def warm_up(settings: PlannerSettings, robot: RobotSpec, item: ObjectSpec) -> No
     planner = PushPlanner(quick, grid, robot, item)
     ends = np.zeros(3), np.array([0.3, 0.0, 0.0])
     planner.solve(*ends)
+    CostBound(planner.scene, *ends).of_boxes(np.zeros((1, 5)))
     known = RunEnds.of(planner.scene, *ends)
     for _ in pushes_over_arcs(planner.scene, known, np.inf, None, _NODES, SearchStatistics()):
         pass

@@ -93,7 +93,10 @@ def test_a_world_that_runs_out_of_room_for_contacts_goes_on():
     batch = PlanarBatch(2, EnvironmentSpec((0.5, 0.5)), [disc] * n, [load_object("box9")])
     room = batch._contacts.keys.shape[1]
     batch._contacts = type(batch._contacts)(
-        *(a[:, :8] if a.ndim > 1 and a.shape[1] == room else a for a in batch._contacts)
+        *(
+            np.ascontiguousarray(a[:, :8]) if a.ndim > 1 and a.shape[1] == room else a
+            for a in batch._contacts
+        )
     )
     batch._contacts = batch._contacts._replace(number=np.zeros((2, 1), dtype=np.int64))
     side = disc.footprint_radius * 2.02

@@ -237,6 +237,7 @@ def test_a_bag_with_targets_that_came_by_an_action_is_refused(tmp_path, capsys):
     assert "push_along, swarm_move" in capsys.readouterr().err
 
 
+@pytest.mark.long
 @pytest.mark.live
 def test_a_live_bag_is_compared_by_distance(tmp_path, capsys):
     from push_bringup.suite import Suite
