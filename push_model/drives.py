@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from push_model.arrays import Array
-from push_model.kinematics import DifferentialDrive
+from push_model.kinematics import DifferentialDrive, Number
 from push_model.settings import bounded, settings
 
 
@@ -64,17 +64,21 @@ class HolonomicDrive:
 
     def saturate_all(self, twists: Array) -> Array:
         """The same of many twists ``(…, 3)`` [m/s, m/s, rad/s]."""
-        need = np.maximum(
-            np.hypot(twists[..., 0], twists[..., 1]) / self.max_speed,
-            np.abs(twists[..., 2]) / self.max_turn_rate,
-        )
-        scaled: Array = twists / np.maximum(need, 1.0)[..., None]
-        return scaled
+        return saturate_any_way(twists, self.max_speed, self.max_turn_rate)
 
     def saturate(self, vx: float, vy: float, omega: float) -> tuple[float, float, float]:
         """The feasible twist of the same direction and rotation centre: scaled by one factor."""
         need = max(math.hypot(vx, vy) / self.max_speed, abs(omega) / self.max_turn_rate)
         return (vx, vy, omega) if need <= 1.0 else (vx / need, vy / need, omega / need)
+
+
+def saturate_any_way(twists: Array, max_speed: Number, max_turn_rate: Number) -> Array:
+    """The feasible twists ``(…, 3)`` [m/s, m/s, rad/s] of the same directions and rotation centres,
+    of one drive or each of its own: max_speed [m/s], max_turn_rate [rad/s]."""
+    speed, turn = np.hypot(twists[..., 0], twists[..., 1]), np.abs(twists[..., 2])
+    need = np.maximum(np.maximum(speed / max_speed, turn / max_turn_rate), 1.0)
+    scaled: Array = twists / need[..., None]
+    return scaled
 
 
 Drive = SpeedDrive | TorqueDrive | HolonomicDrive

@@ -51,10 +51,7 @@ class DifferentialDrive:
 
     def saturate_all(self, twists: Array) -> Array:
         """The same of many twists ``(…, 3)`` [m/s, m/s, rad/s]; the second column becomes 0."""
-        v, omega = twists[..., 0], twists[..., 2]
-        need = (np.abs(v) + np.abs(omega) * self.half_track) / self.max_speed
-        need = np.maximum(need, 1.0)
-        return np.stack([v / need, np.zeros_like(v), omega / need], axis=-1)
+        return saturate_wheels(twists, self.half_track, self.max_speed)
 
     def saturate(self, v: float, omega: float) -> tuple[float, float]:
         """The nearest feasible twist of the same curvature: both scaled by one factor."""
@@ -83,6 +80,14 @@ class DifferentialDrive:
         omega = (-s * velocities[:, 0] + c * velocities[:, 1]) / lead
         need = (np.abs(v) + np.abs(omega) * self.half_track) / self.max_speed
         return np.column_stack([v, omega]) / np.maximum(need, 1.0)[:, None]
+
+
+def saturate_wheels(twists: Array, half_track: Number, max_speed: Number) -> Array:
+    """The nearest feasible twists ``(…, 3)`` [m/s, m/s, rad/s] of the same curvatures, of one drive
+    or each of its own: half_track [m], max_speed [m/s]; the second column becomes 0."""
+    v, omega = twists[..., 0], twists[..., 2]
+    need = np.maximum((np.abs(v) + np.abs(omega) * half_track) / max_speed, 1.0)
+    return np.stack([v / need, np.zeros_like(v), omega / need], axis=-1)
 
 
 def unicycle_step(state: Array, v: float, omega: float, dt: float) -> Array:

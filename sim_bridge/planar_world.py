@@ -13,7 +13,8 @@ import numpy as np
 
 from push_model import se2
 from push_model.arrays import Array
-from push_model.drives import HolonomicDrive
+from push_model.drives import Drive, HolonomicDrive, saturate_any_way
+from push_model.kinematics import saturate_wheels
 from push_model.occupancy import MapSpec
 from push_model.settings import bounded, settings
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
@@ -80,8 +81,7 @@ class PlanarWorld:
         self._parts, self._near, self._largest = tables.parts, tables.near, tables.largest
         self._contacts, self._sums = make_contacts(tables.room), make_sums(tables.room)
         self._drives = [robot.drive for robot, _ in robots.values()]
-        self._unlike = [d for k, d in enumerate(self._drives) if d not in self._drives[:k]]
-        self._kind_of_drive = np.array([self._unlike.index(d) for d in self._drives])
+        self._limits = np.array([_limits(d) for d in self._drives]).reshape(-1, 2)
         self._dead: set[str] = set()
         self.reset()
 
@@ -171,10 +171,12 @@ class PlanarWorld:
         if self._dead:
             alive = np.array([robot not in self._dead for robot in robots], dtype=np.bool_)
             rows, twists = rows[alive], twists[alive]
-        for k, drive in enumerate(self._unlike):
-            mine = self._kind_of_drive[rows] == k
-            b.target[rows[mine]] = drive.saturate_all(twists[mine])
-        b.own_frame[rows[b.kind[rows] == HOLONOMIC]] = not fixed_frame
+        any_way = b.kind[rows] == HOLONOMIC
+        for mine, saturate in ((~any_way, saturate_wheels), (any_way, saturate_any_way)):
+            if mine.any():
+                some = rows[mine]
+                b.target[some] = saturate(twists[mine], *self._limits[some].T)
+        b.own_frame[rows[any_way]] = not fixed_frame
 
     def _command_one(self, row: int, twist: Sequence[float], fixed_frame: bool) -> None:
         target, drive = self._bodies.target[row], self._drives[row]
@@ -261,6 +263,13 @@ class PlanarWorld:
         self._bodies.there[self._rows[name]] = False
         self._dead |= {name} & set(self._robots)
         self._list_bodies()
+
+
+def _limits(drive: Drive) -> tuple[float, float]:
+    """Two limits of a drive, as its saturation takes them: see drives.py and kinematics.py."""
+    if isinstance(drive, HolonomicDrive):
+        return drive.max_speed, drive.max_turn_rate
+    return drive.half_track, drive.max_speed
 
 
 def _make(
