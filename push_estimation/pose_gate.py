@@ -90,12 +90,23 @@ class Stamp(Enum):
     RESUMED = "resumed"
 
 
+Values = tuple[float, float, float]
+
+
 @dataclass
 class _Body:
+    """values: of the pose."""
+
     pose: Array
+    values: Values
     stamp: float
-    candidate: Array | None = None
+    candidate: Values | None = None
     repeats: int = 0
+
+    def take(self, pose: Array, values: Values, stamp: float) -> None:
+        """A further accepted pose."""
+        self.pose, self.values, self.stamp = pose, values, stamp
+        self.candidate, self.repeats = None, 0
 
 
 class PoseGate:
@@ -165,33 +176,35 @@ class PoseGate:
         """Offer a pose ``(3,)`` of this frame; False when it is refused, gated or not wanted."""
         if self.bodies is not None and name not in self.bodies:
             return False
-        if not all(map(math.isfinite, pose.tolist())):
+        x, y, heading = pose.tolist()
+        if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(heading)):
             self.refused += 1
             return False
+        values = x, y, heading
         body = self._bodies.get(name)
         if body is None:
-            self._bodies[name] = _Body(pose, self.stamp)
+            self._bodies[name] = _Body(pose, values, self.stamp)
             return True
         s = self.settings
         # Long unseen is not a licence to be anywhere: the allowance stops growing.
         elapsed = min(self.stamp - body.stamp, 4.0 * s.timeout)
-        if self._close(body.pose, pose, elapsed):
-            self._bodies[name] = _Body(pose, self.stamp)
+        if self._close(body.values, values, elapsed):
+            body.take(pose, values, self.stamp)
             return True
         self.jumps += 1
-        if body.candidate is not None and self._close(body.candidate, pose, s.timeout):
+        if body.candidate is not None and self._close(body.candidate, values, s.timeout):
             body.repeats += 1
         else:
             body.repeats = 1
-        body.candidate = pose
+        body.candidate = values
         if body.repeats >= s.persistence:
-            self._bodies[name] = _Body(pose, self.stamp)
+            body.take(pose, values, self.stamp)
             return True
         return False
 
-    def _close(self, first: Array, second: Array, elapsed: float) -> bool:
+    def _close(self, first: Values, second: Values, elapsed: float) -> bool:
         s = self.settings
-        (x, y, heading), (x2, y2, heading2) = first.tolist(), second.tolist()
+        (x, y, heading), (x2, y2, heading2) = first, second
         way, turn = math.hypot(x2 - x, y2 - y), abs(se2.wrap(heading2 - heading))
         return (
             way <= s.max_speed * elapsed + s.jump_margin
