@@ -6,7 +6,8 @@ import pytest
 from benchmarks.plan import attempt, exhaustive
 from benchmarks.plan_problems import problems_of
 from push_model.occupancy import rasterise
-from push_planner import PlannerSettings, PushPlanner
+from push_planner import PlannerSettings, PlanningFailed, PushPlanner
+from tests.push_planner.first_version import SEED, SOLVED
 
 
 def unsolved(kind, robot, box, count, seed):
@@ -44,3 +45,34 @@ def test_what_an_exhaustive_search_solves_is_solved(robot, box, kind, count, par
     missed, solvable = unsolved(kind, robot, box, count, 2)
     assert solvable > 0.7 * count
     assert len(missed) <= (1.0 - part) * solvable, missed
+
+
+def lost(kind, robot, box, numbers):
+    """Those of the numbered problems for which there is no plan, or one that passes too near."""
+    problems = list(problems_of(kind, box, max(numbers) + 1, SEED))
+    found = []
+    for number in numbers:
+        problem = problems[number]
+        planner = PushPlanner(PlannerSettings(), rasterise(problem.world), robot, box)
+        try:
+            plan = planner.solve(problem.start, problem.goal)
+        except PlanningFailed as error:
+            found.append((number, str(error)))
+            continue
+        assert plan.segments[-1].object_end == pytest.approx(problem.goal, abs=1e-9), number
+        if plan.clearance < planner.settings.safety_distance - 1e-9:
+            found.append((number, plan.clearance))
+    return found
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kind", SOLVED)
+def test_a_few_problems_that_the_first_version_solved_are_solved(robot, box, kind):
+    """Every twentieth."""
+    assert not lost(kind, robot, box, SOLVED[kind][::20])
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("kind", SOLVED)
+def test_no_problem_that_the_first_version_solved_is_lost(robot, box, kind):
+    assert not lost(kind, robot, box, SOLVED[kind])
