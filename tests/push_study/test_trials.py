@@ -99,7 +99,9 @@ def test_a_bar_on_a_terminal_and_plain_lines_elsewhere():
 
 
 @pytest.mark.live
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)]
+)
 def test_a_signal_keeps_finished_trials_and_leaves_no_process(tmp_path, number):
     """FAULTS 18 and 19."""
     code = (

@@ -271,6 +271,7 @@ def test_a_demo_in_lockstep_ends_with_a_report_and_can_be_repeated(tmp_path, cap
     assert (out / "bag").is_dir()  # nothing was removed
 
 
+@pytest.mark.long
 def test_a_demo_succeeds_within_the_tolerances_of_its_method(tmp_path, capsys):
     """Robots with own sensing bring the object to within 10 cm, with any heading."""
     small = """
