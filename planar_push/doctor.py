@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--drive",
         action="store_true",
-        help="move each robot by 3 cm and by 30 degrees and back, and compare; needs free floor, "
+        help="move each robot by 3 cm and by 23 degrees and back, and compare; needs free floor, "
         "and no suite that runs",
     )
     parser.add_argument(
