@@ -124,7 +124,7 @@ def test_wheels_that_slip_keep_their_traction(turn_rate: float) -> None:
     start = np.array([0.5 * OPEN.size[0] - robot.push_distance - 1e-3, 0.0, 0.0])
     felt = []
     with PyBulletWorld(OPEN, {"r": (robot, start)}, {}) as world:
-        world.command("r", 0.08, turn_rate)
+        world.command("r", 0.06, turn_rate)
         for _ in range(12):
             world.step(20)
             felt.append(sum(abs(c.force[0]) for c in world.read_contacts()))
