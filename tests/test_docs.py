@@ -6,6 +6,7 @@ import importlib
 import re
 import shlex
 from enum import IntEnum
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -191,9 +192,12 @@ def words_of(line):
     return None
 
 
+_parser = cache(parser)
+
+
 def understood(words):
     """Options and choices exist, and so do the experiments, benches and scenarios."""
-    parsed = parser().parse_args(words)
+    parsed = _parser().parse_args(words)
     scenarios = {p.stem for p in (ROOT / "config/scenarios").glob("*.yaml")}
     if words[0] == "experiment":
         named = set(filter(None, parsed.scenarios.split(",")))

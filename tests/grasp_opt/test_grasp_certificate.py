@@ -88,6 +88,7 @@ def test_intervals_beyond_the_object_give_no_certificate():
     assert certificate.margin(Placer(item, SIX["sinusoid-1"], 2, 0.05).outline.at(np.zeros(2))) < 0
 
 
+@pytest.mark.long
 def test_placements_hold_for_all_that_is_believed_where_any_do():
     """Placements for the believed values alone do not, in many cases."""
     nominal = sure = cases = 0

@@ -23,6 +23,7 @@ from push_scenario.bodies import load_object, load_robot
 from push_study.experiments.group_goals import GoalTask, problem
 from push_study.uncertainty import uncertainty
 from tests.driving import TICK, GroupWorld, answer
+from tests.samples import mostly_long
 
 ROBOT = load_robot("epuck_ring")
 ROOM = EnvironmentSpec((6.0, 6.0), resolution=0.05)
@@ -136,7 +137,7 @@ def test_after_an_interruption_everything_has_come_to_rest():
     assert (prediction.robots(pose) == pose).all() and (prediction.item(pose[0]) == pose[0]).all()
 
 
-@pytest.mark.parametrize("case", list(CASES)[:3])
+@pytest.mark.parametrize("case", mostly_long(list(CASES)[:3], 1))
 def test_a_declared_latency_costs_no_accuracy(case):
     """And one that is not declared does: the bound is not met by itself."""
     base, turned = errors(case, 0.0, 1)

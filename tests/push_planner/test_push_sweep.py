@@ -114,6 +114,7 @@ def test_a_curve_that_nearly_stops_is_not_trusted(robot, box):
         assert 0.0 <= found <= exact + 1e-6
 
 
+@pytest.mark.long
 def test_robots_that_have_room_behind_keep_the_distance_all_the_way(robot, box):
     """1200 poses in contact: clear of what is solid wherever they back off."""
     random = np.random.default_rng(5)

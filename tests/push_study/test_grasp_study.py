@@ -77,6 +77,7 @@ def test_discs_turn_with_their_formation():
     assert body[0] == pytest.approx(item.limit_surface().max_force, rel=0.1)
 
 
+@pytest.mark.long
 def test_equal_tasks_give_equal_rows_and_worlds_the_same_grasps():
     task = next(some(1, "planar", 3))
     assert grasp_study.trial(task) == grasp_study.trial(task)

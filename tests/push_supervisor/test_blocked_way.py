@@ -45,6 +45,7 @@ def gaps(segment, outlines, x, y, radius):
     return np.array(result)
 
 
+@pytest.mark.long
 def test_bodies_on_the_way_of_random_pushes_are_seen_and_no_others(robot, box):
     random = np.random.default_rng(5)
     outlines = robot.outline, box.outline

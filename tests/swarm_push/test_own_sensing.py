@@ -243,6 +243,7 @@ def test_poses_that_cannot_be_give_commands_that_are_finite():
         assert told.shape == (len(robots), 2) and np.isfinite(told).all(), (time, x, robots)
 
 
+@pytest.mark.long
 def test_robots_far_away_that_see_only_each_other_find_the_object():
     """They went to each other and stood there for ever."""
     grid = EnvironmentSpec((5.0, 5.0), resolution=0.05)

@@ -68,6 +68,7 @@ def test_bodies_that_nobody_named_are_obstacles_and_are_not_commanded():
         assert not set(NEW) & {*moved, *told[-1], *state.robots}
 
 
+@pytest.mark.long
 def test_robots_join_when_they_are_told_of_take_part_and_are_released():
     """One robot of the scenario cannot turn the object to a heading: that takes two."""
     with running(count=1) as run:

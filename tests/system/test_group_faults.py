@@ -40,6 +40,7 @@ def pushing(run):
     )
 
 
+@pytest.mark.long
 def test_when_the_object_is_not_seen_all_stand_and_go_on_when_it_is():
     """Row 7. The trajectory waits, nobody is taken for dead, nothing is planned anew."""
     events = [{"kind": "drop_poses", "at": 24.0, "bodies": ["plate"], "duration": 4.0}]
@@ -148,6 +149,7 @@ def test_the_world_stands_still_for_a_while_and_the_job_goes_on(run):
     assert run.observer.state.error_code == 0
 
 
+@pytest.mark.long
 def test_a_flood_of_goals_ends_with_the_last_one(run):
     """Row 28: the one that is pursued restarts nothing."""
     goals = [np.array([0.02 * k, 0.3, -1.2]) for k in range(20)]

@@ -96,6 +96,7 @@ def test_stopped_stream_stops_the_robot_and_its_return_lets_it_go_on(short, monk
     assert final_errors(short.observer.trace, short.scenario.goal)[0] < 0.02
 
 
+@pytest.mark.long
 def test_jumped_pose_is_not_chased(short):
     """FAULTS 9: zeros, as a tracking system reports a lost body."""
     pushing(short)

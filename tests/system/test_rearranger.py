@@ -138,6 +138,7 @@ def test_goals_that_cannot_be_are_refused_and_the_job_goes_on(message, code, wor
     assert run.node.busy and state.job == 1
 
 
+@pytest.mark.long
 def test_what_happens_in_mid_job(run):
     """One run after another in one world: cancel, a person's goal, other goals, a moved box."""
     run.send(GOALS)

@@ -81,6 +81,7 @@ def test_the_job_is_taken_up_again_and_ends_at_the_goal(monkeypatch, system):
         assert np.hypot(*off[:2]) < 0.03
 
 
+@pytest.mark.long
 def test_targets_in_a_row_go_on_with_those_that_are_left(monkeypatch):
     with running(monkeypatch, "swarm") as run:
         move_on = {"x": [0.5, 0.9], "y": [0.2, -0.3]}
@@ -112,7 +113,7 @@ def spoilt(run, how):
     ("how", "code"),
     [
         pytest.param("moved", JobError.JOB_FORGOTTEN, marks=pytest.mark.long),
-        ("reset", JobError.CLOCK_RESET),
+        pytest.param("reset", JobError.CLOCK_RESET, marks=pytest.mark.long),
         pytest.param("late reset", JobError.CLOCK_RESET, marks=pytest.mark.long),
         pytest.param("died too often", JobError.JOB_FORGOTTEN, marks=pytest.mark.long),
         pytest.param("another team", JobError.NONE, marks=pytest.mark.long),

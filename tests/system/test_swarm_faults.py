@@ -85,6 +85,7 @@ def test_a_reset_of_the_world_ends_the_job_and_the_next_goal_is_reached(run):
     assert state is not None and state.error_code == 0
 
 
+@pytest.mark.long
 def test_poses_that_are_none_are_refused_and_change_nothing(run):
     """Rows 1 and 23: another source of poses that lies."""
     liar = run.observer.create_publisher(Poses, "/poses", STREAM)
@@ -106,6 +107,7 @@ def test_poses_that_are_none_are_refused_and_change_nothing(run):
     assert run.observer.state.error_code == 0 and error(run)[0] < 0.03
 
 
+@pytest.mark.long
 def test_the_world_stands_still_for_a_while_and_the_job_goes_on(run):
     """Row 24."""
     client = run.observer.create_client(SetBool, "/bridge/pause")
