@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import TwistStamped
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.node import Node
 from std_msgs.msg import Header
 
@@ -34,7 +35,11 @@ from push_ros.scheduling import Urgency
 from push_ros.validation import InvalidMessage
 from push_scenario.scenario import Scenario, load_scenario
 from swarm_push.agent import Agent, AgentSettings, AgentState
-from swarm_push.swarm_messages import agent_state_from_ros, agent_state_to_ros, target_from_ros
+from swarm_push.swarm_messages import (
+    agent_state_from_bytes,
+    agent_state_to_ros,
+    target_from_ros,
+)
 from swarm_push.swarm_method import SECTIONS, swarm_job
 
 
@@ -78,12 +83,12 @@ class SwarmAgentNode(Node):
         self._said = self.create_publisher(
             SwarmAgentState, names.team("swarm_agent_states"), CHATTER
         )
-        for kind, topic, handler, qos in (
-            (SwarmAgentState, names.team("swarm_agent_states"), self._on_neighbour, CHATTER),
-            (SwarmTarget, names.team("swarm_target"), self._on_target, COMMAND),
+        for kind, topic, handler, qos, raw in (
+            (SwarmAgentState, names.team("swarm_agent_states"), self._on_neighbour, CHATTER, True),
+            (SwarmTarget, names.team("swarm_target"), self._on_target, COMMAND, False),
         ):
             events = self._diagnostics.subscription_events(topic)
-            self.create_subscription(kind, topic, handler, qos, event_callbacks=events)
+            self.create_subscription(kind, topic, handler, qos, event_callbacks=events, raw=raw)
         MapFeed(self, names, self._diagnostics, self._take_map)
         BeliefFeed(self, names, scenario, self._diagnostics, self._take_up)
         self._poses = PoseFeed(
@@ -132,14 +137,17 @@ class SwarmAgentNode(Node):
             return
         self._told = time_from_ros(message.header.stamp)
 
-    def _on_neighbour(self, message: SwarmAgentState) -> None:
+    def _on_neighbour(self, data: bytes) -> None:
         try:
-            message = agent_state_from_ros(message)
+            heard = agent_state_from_bytes(data)
         except InvalidMessage as error:
             self._diagnostics.refuse("swarm_agent_states", str(error))
             return
-        if message.name in self._team and message.name != self.robot:
-            self._messages.append(message)
+        except (RuntimeError, RCLError) as error:
+            self._diagnostics.refuse("swarm_agent_states", f"the message cannot be read: {error}")
+            return
+        if heard.name in self._team and heard.name != self.robot:
+            self._messages.append(heard)
 
     # What it does
 

@@ -1,9 +1,11 @@
 """The messages of agents of a decentralised swarm."""
 
+import functools
 import math
 from typing import Any
 
 import numpy as np
+from rclpy.serialization import deserialize_message
 
 from push_model.arrays import Array
 from push_msgs.msg import SwarmAgentState, SwarmTarget
@@ -48,6 +50,20 @@ def agent_state_to_ros(stamp: Any, state: AgentState) -> SwarmAgentState:
     return message
 
 
+@functools.lru_cache(maxsize=256)
+def agent_state_from_bytes(data: bytes) -> AgentState:
+    """The state that an agent broadcast, from its serialised message.
+
+    Agents of one process receive the same bytes: they are decoded once for all of them.
+
+    Raises
+    ------
+    InvalidMessage
+    RuntimeError: the bytes are no such message.
+    """
+    return agent_state_from_ros(deserialize_message(data, SwarmAgentState))
+
+
 def agent_state_from_ros(message: SwarmAgentState) -> AgentState:
     """The state that an agent broadcast.
 
@@ -62,5 +78,12 @@ def agent_state_from_ros(message: SwarmAgentState) -> AgentState:
     flows = np.column_stack([message.flow_x, message.flow_y]).reshape(-1, 2)
     finite((*pose, *mean, *flows.ravel()), "the state of an agent")
     time = time_from_ros(message.header.stamp)
+    flows.setflags(write=False)  # several agents may hold the same state
     handed = dict(zip(message.heard, flows, strict=True))
-    return AgentState(message.robot, time, np.array(pose), np.array(mean), handed)
+    return AgentState(message.robot, time, _fixed(pose), _fixed(mean), handed)
+
+
+def _fixed(values: tuple[float, ...]) -> Array:
+    array = np.array(values)
+    array.setflags(write=False)
+    return array

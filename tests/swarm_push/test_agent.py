@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from rclpy.serialization import serialize_message
 
 from push_msgs.msg import SwarmAgentState, SwarmTarget
 from push_ros.validation import InvalidMessage
@@ -13,6 +14,7 @@ from swarm_push.agent import Agent, AgentSettings, AgentState
 from swarm_push.laws import LawSections, LawSettings
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
 from swarm_push.swarm_messages import (
+    agent_state_from_bytes,
     agent_state_from_ros,
     agent_state_to_ros,
     target_from_ros,
@@ -144,6 +146,19 @@ def test_words_and_targets_go_through_their_messages():
             agent_state_from_ros(message)
     with pytest.raises(InvalidMessage):
         agent_state_from_ros(SwarmAgentState(robot="e1"))
+
+
+def test_a_state_is_decoded_once_for_all_that_receive_it_and_none_can_alter_it():
+    word = AgentState("e3", 0.0, np.ones(3), np.ones(2), {"e1": np.array([0.5, 1.0])})
+    data = serialize_message(agent_state_to_ros(STAMP, word))
+    first, second = agent_state_from_bytes(data), agent_state_from_bytes(bytes(bytearray(data)))
+    assert first is second and np.array_equal(first.flows["e1"], [0.5, 1.0])
+    for array in (first.pose, first.mean, first.flows["e1"]):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0.0
+    for wrong in (data[:9], b"\x00\x01\x00\x00" + b"\xff" * 40):
+        with pytest.raises(RuntimeError):
+            agent_state_from_bytes(wrong)
 
 
 @pytest.mark.long

@@ -70,9 +70,11 @@ def test_words_and_targets_that_are_none_are_refused():
             words.publish(SwarmAgentState(header=header, robot="e1", x=value))
             targets.publish(SwarmTarget(header=header, active=True, x=value))
             run.spin_until(lambda: False, 0.2)
+        words.publish(b"\x00\x01\x00\x00" + b"\xff" * 40)  # no message of its type
+        run.spin_until(lambda: False, 0.2)
         for agent in agents(run):
             refused = agent._diagnostics.refused
-            assert refused["swarm_agent_states"] >= 2 and refused["swarm_target"] >= 2
+            assert refused["swarm_agent_states"] >= 3 and refused["swarm_target"] >= 2
             assert np.array_equal(agent.agent.target, GOAL)
         assert all(math.isfinite(speed) for _, speed in told) and told[-1][1] > 0.0
         run.supervisor.end_job(JobError.CANCELED, "enough")
