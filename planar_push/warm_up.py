@@ -33,15 +33,20 @@ def _one_robot() -> None:
     import numpy as np
 
     from push_model.corner_push import corner_push, touching
-    from push_mpc import LtvMpc, MpcSettings, TrackerSettings, TrajectoryTracker
+    from push_mpc import TrackerSettings, TrajectoryTracker
+    from push_mpc.controllers import CONTROLLERS
     from push_planner import PlannerSettings, PushPlanner, warm_up
+    from push_qp import BACKENDS
     from push_scenario.scenario import load_scenario
     from sim_bridge.planar_world import PlanarWorld
 
     scenario = load_scenario("env1-target1")
     _, robot = scenario.robot()
     _, item = scenario.object()
-    TrajectoryTracker(TrackerSettings(), LtvMpc(MpcSettings(), robot.differential)).warm_up()
+    for kind in CONTROLLERS.values():
+        for solver in BACKENDS:
+            mpc = kind.make(kind.settings(backend=solver), robot.differential)
+            TrajectoryTracker(TrackerSettings(), mpc).warm_up()
     start = next(iter(scenario.objects.values()))[1]
     goal = scenario.goal if scenario.goal is not None else np.zeros(3)
     warm_up(PlannerSettings(), robot, item)
@@ -66,6 +71,7 @@ def _placements() -> None:
     from grasp_opt.indices import composed_quality, extension, modified_hausdorff
     from grasp_opt.object_trajectory import sinusoid
     from grasp_opt.placement import Placer
+    from grasp_opt.wrench_cone import margins
     from push_scenario.bodies import load_object
 
     placer = Placer(load_object("plate_ellipse"), sinusoid(0.0, 1.0, 0.5, 0.1, 0.1), 2, 0.05)
@@ -73,6 +79,7 @@ def _placements() -> None:
     composed_quality(contacts.points, contacts.normals)
     extension(contacts.points)
     modified_hausdorff(np.ones((1, 3, 3)), np.ones((1, 3)))
+    margins(np.ones((1, 3, 3)), np.ones((1, 3)))
 
 
 def _methods() -> None:
@@ -98,6 +105,7 @@ def _batches() -> None:
     from push_model.point_push import Disc, body, driven, gap, placed, push
     from push_model.specs import EnvironmentSpec
     from push_scenario.scenario import load_scenario
+    from sim_bridge.planar.tables import grown, make_contacts
     from sim_bridge.planar_batch import PlanarBatch
 
     scenario = load_scenario("env1-target1")
@@ -105,6 +113,7 @@ def _batches() -> None:
     batch = PlanarBatch(2, EnvironmentSpec((1.0, 1.0)), [robot], [item])
     batch.command(np.ones((2, 1, 3)))
     batch.step(2)
+    grown(make_contacts(4))
     box, disc = body(item.outline, 0.03), Disc(0.01, 100.0, 20.0, 0.01, 0.2, 1e-3)
     gap(0.1, 0.0, placed(box, np.zeros(3)), box.first, box.count)
     push(box, disc, np.zeros((1, 6)), np.full((1, 4), 0.05), np.zeros((1, 2)), 2)

@@ -1,6 +1,9 @@
 """What ``planar-push warm-up`` compiles, and what is compiled after it: nothing."""
 
 import gc
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -16,6 +19,25 @@ from push_study.experiments import pusht
 from sim_bridge.planar_world import PlanarWorld
 
 _STEP = 0.01  # [s]
+_IN_A_NEW_PROCESS = """
+import importlib, pathlib, pkgutil, tomllib
+from numba.core.dispatcher import Dispatcher
+from planar_push import warm_up
+
+warm_up.run(None)
+project = tomllib.loads(pathlib.Path("pyproject.toml").read_text())
+found = {}
+for package in project["tool"]["setuptools"]["packages"]:
+    for info in pkgutil.iter_modules(importlib.import_module(package).__path__, package + "."):
+        if package != "benchmarks" and not info.ispkg and not info.name.endswith("__main__"):
+            for thing in vars(importlib.import_module(info.name)).values():
+                if isinstance(thing, Dispatcher):
+                    found[thing.py_func.__module__ + "." + thing.py_func.__qualname__] = thing
+print("functions:", len(found))
+for name, function in sorted(found.items()):
+    if not function.signatures and function.targetoptions.get("inline") != "always":
+        print("not compiled:", name)
+"""
 
 
 def compiled():
@@ -64,3 +86,17 @@ def test_after_it_nothing_is_compiled():
     chooser.target(pusht.to_mass(np.array([0.3, 0.3, 0.5])), np.array([0.1, 0.1, 0.0, 0.0]))
     driven(pusht.DISC, np.zeros(4), np.ones(2), 1)
     assert sorted(compiled() - before) == []
+
+
+@pytest.mark.long
+def test_it_compiles_every_kernel_where_no_cache_is_yet(tmp_path):
+    """Kernels that others inline are no functions of their own."""
+    run = subprocess.run(
+        [sys.executable, "-c", _IN_A_NEW_PROCESS],
+        env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)},
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
+    )
+    assert int(run.stdout.split("functions: ")[1].split()[0]) > 150
+    assert "not compiled: " not in run.stdout, run.stdout
