@@ -174,10 +174,15 @@ class Placer:
     def pushes(self, way: Array) -> bool:
         """Whether every contact moves towards the object all along: who goes ahead of it does not
         push, but holds it back."""
-        contacts = self.outline.at(way)
+        return bool(self._pushing(np.asarray(way)[None])[0])
+
+    def _pushing(self, ways: Array) -> Mask:
+        """``pushes`` of many placements ``(k, n)``."""
+        contacts = self.outline.at(ways.ravel())
         (x, y), (nx, ny), (vx, vy, omega) = contacts.points.T, contacts.normals.T, self._moving.T
         towards = np.outer(vx, nx) + np.outer(vy, ny) + np.outer(omega, x * ny - y * nx)
-        return bool((towards > 0.0).all())
+        pushing: Mask = np.all((towards > 0.0).reshape(-1, *ways.shape), axis=(0, 2))
+        return pushing
 
     def margin(self, contacts: Contacts) -> float:
         """The margin of the grasp-task compatibility test."""
@@ -230,18 +235,24 @@ class Placer:
 
     def existing(self) -> Work[bool]:
         """Whether any of the candidates holds the task, in slices."""
-        candidates, s = (yield from self.candidates()), self.settings
+        candidates = yield from self.candidates()
         # Those far apart first: neighbours hold or fail together.
         order = np.argsort(np.mod(np.arange(len(candidates)) * _GOLDEN, 1.0))
         for k in range(0, len(order), _SLICE):
-            some = candidates[order[k : k + _SLICE]]
-            if s.only_pushing:
-                some = some[[self.pushes(way) for way in some]]
-            for way in some[self._margins(some) >= s.least_margin - HELD]:
+            for way in self._screened(candidates[order[k : k + _SLICE]]):
                 if self.holds(way):
                     return True
             yield
         return False
+
+    def _screened(self, ways: Array) -> Array:
+        """Those of the placements ``(k, n)`` that push and have the margin: what ``holds`` asks
+        for first, of many at once, without their costs."""
+        if self.settings.only_pushing:
+            ways = ways[self._pushing(ways)]
+        if self.settings.least_margin > -1.0:
+            ways = ways[self._margins(ways) >= self.settings.least_margin - HELD]
+        return ways
 
     def _margins(self, ways: Array) -> Array:
         """``margin`` of placements ``(k, n)``."""
@@ -269,6 +280,11 @@ class Placer:
             raise NoPlacement(
                 f"{self.count} robots of {1e3 * self.radius:.0f} mm find no room around the object"
             )
+        screened = []
+        for k in range(0, len(candidates), _SLICE):
+            screened.append(self._screened(candidates[k : k + _SLICE]))
+            yield
+        candidates = np.vstack(screened)
         costs = np.empty(len(candidates))
         for k, way in enumerate(candidates):
             costs[k] = self.cost(way, _LOOSE)

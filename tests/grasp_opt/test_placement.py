@@ -7,17 +7,19 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from grasp_opt.object_trajectory import polynomial, study_trajectories
+from grasp_opt.object_trajectory import polynomial, screw, study_trajectories
 from grasp_opt.placement import NoPlacement, PlacementSettings, Placer
 from grasp_opt.placement_bound import PlacementBound
 from grasp_opt.placement_nlp import LocalPlacer
 from grasp_opt.robust_placement import robust_placement
+from grasp_opt.wrench_cone import HELD
 from push_model.shape_specs import RectangleShape
 from push_scenario.bodies import load_object
 from tests.samples import mostly_long
 
 SIX = study_trajectories()
 FEW = PlacementSettings(steps=12)
+PACES = 0.05, 0.05, 0.2  # [m/s], [m/s^2], [m]: speed, acceleration and reach of a screw
 
 
 def plates():
@@ -148,6 +150,27 @@ def test_a_robust_placement_has_margin_pushes_only_and_asks_no_robot_for_too_muc
         NoPlacement, match=r"supports the task with a margin of 0 and 0\.5 N a robot"
     ):
         robust_placement(item, task, 2, 0.05, 0.5, FEW)
+
+
+def test_what_the_screen_leaves_out_does_not_hold_the_task():
+    """Costs are computed only of what pushes and has the margin."""
+    random, kept, all_of_them = np.random.default_rng(7), 0, 0
+    shapes = list(plates().values())
+    for _ in range(40):
+        count, least = int(random.integers(2, 6)), float(random.choice([0.0, 0.05, 0.1]))
+        asked = replace(FEW, least_margin=least, only_pushing=True, most_force=1.0)
+        item = shapes[random.integers(4)]
+        task = screw(np.zeros(3), np.array([0.3, *random.normal(size=2) * [0.05, 0.2]]), *PACES)
+        placer = Placer(item, task, count, 0.05, asked)
+        ways = placer.grid(20)
+        ways = ways[random.choice(len(ways), min(60, len(ways)), replace=False)]
+        screened = {tuple(way) for way in placer._screened(ways)}
+        for way in ways:
+            enough = placer.margin(placer.outline.at(way)) >= least - HELD
+            assert (tuple(way) in screened) == (enough and placer.pushes(way))
+            assert tuple(way) in screened or not placer.holds(way)
+        kept, all_of_them = kept + len(screened), all_of_them + len(ways)
+    assert 0.02 < kept / all_of_them < 0.6
 
 
 def test_a_greater_margin_is_asked_for_where_there_is_one():
