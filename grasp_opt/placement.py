@@ -138,12 +138,8 @@ class Placer:
             )
         )  # fmt: skip
 
-    def allowed(self, way: Array) -> bool:
-        """Whether robots have room at these places, keep apart and off the corners."""
-        return bool(self._allowed(np.asarray(way)[None])[0])
-
-    def _allowed(self, ways: Array) -> Mask:
-        """``allowed`` of many placements ``(k, n)``."""
+    def allowed(self, ways: Array) -> Mask:
+        """Of placements ``(k, n)``, whether robots have room there, keep apart and off corners."""
         s, flat = self.settings, ways.ravel()
         good = (self.outline.from_corner(flat) >= s.corner) & self._free(flat)
         allowed: Mask = np.all(good.reshape(ways.shape), axis=1)
@@ -228,7 +224,7 @@ class Placer:
             rows += [np.concatenate([pair, other]) for pair in pairs for other in others]
         for k in range(0, len(rows), _SLICE):
             some = np.array(rows[k : k + _SLICE])
-            found.append(some[self._allowed(some)])
+            found.append(some[self.allowed(some)])
             yield
         self._candidates = np.mod(np.vstack(found), total)
         return self._candidates
@@ -322,18 +318,19 @@ class Placer:
         """
         way = np.array(way, dtype=np.float64)
         order = np.argsort(np.argsort(way)) - 0.5 * (self.count - 1)
-        moves = [*np.eye(self.count), np.ones(self.count), order]
-        moves = [sign * move for move in moves for sign in (1.0, -1.0)]
+        moves = np.vstack([np.eye(self.count), np.ones(self.count), order])
+        moves = np.kron(moves, np.array([[1.0], [-1.0]]))
         cost = self.cost(way)
         while step > finest:
-            better = False
-            for move in moves:
-                trial = way + step * move
-                if not self.allowed(trial):
+            better, allowed = False, self.allowed(way + step * moves)
+            for number, move in enumerate(moves):
+                if not allowed[number]:
                     continue
+                trial = way + step * move
                 other = self.cost(trial)
                 if other < cost * (1.0 - worth) and self.holds(trial):
                     cost, way, better = other, trial, True
+                    allowed = self.allowed(way + step * moves)
             if not better:
                 step *= 0.5
             yield

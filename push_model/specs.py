@@ -192,6 +192,11 @@ class ObjectSpec:
         """``(n, 2)`` [m] in the geometric frame."""
         return self.shape.shape().outline
 
+    @cached_property
+    def pressure_radius(self) -> float:
+        """[m] spin torque of the floor under uniform pressure, over its greatest force."""
+        return uniform_pressure_radius(self.geometry)
+
     @property
     def moment(self) -> float:
         """[kg m^2] about the vertical through the centre of mass."""
@@ -211,7 +216,7 @@ class ObjectSpec:
     def limit_surface(self) -> EllipsoidLimitSurface:
         """Ellipsoid about the centre of mass, with force and spin torque of uniform pressure."""
         force = self.floor_friction * self.mass * GRAVITY
-        return EllipsoidLimitSurface(force, force * uniform_pressure_radius(self.geometry))
+        return EllipsoidLimitSurface(force, force * self.pressure_radius)
 
 
 @settings

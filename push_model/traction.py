@@ -10,7 +10,7 @@ What they carry times their friction is the traction that there is, unless the m
 import math
 
 from push_model.drives import HolonomicDrive, TorqueDrive
-from push_model.limit_surface import GRAVITY, uniform_pressure_radius
+from push_model.limit_surface import GRAVITY
 from push_model.specs import ObjectSpec, RobotSpec
 
 
@@ -29,7 +29,7 @@ def lift_share(robot: RobotSpec, item: ObjectSpec) -> float:
     of uniform pressure, a being the distance of the side, at most the friction coefficient:
     ``min(mu, 2 a z / (rho^2 + 2 a^2))``. The nearest side is taken.
     """
-    a, rho = item.geometry.inradius, uniform_pressure_radius(item.geometry)
+    a, rho = item.geometry.inradius, item.pressure_radius
     return min(item.contact_friction, 2.0 * a * robot.bumper_z / (rho**2 + 2.0 * a**2))
 
 

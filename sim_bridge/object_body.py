@@ -13,7 +13,7 @@ import pybullet as pb
 
 from push_model.arrays import Array
 from push_model.convex_parts import convex_parts
-from push_model.limit_surface import GRAVITY, uniform_pressure_radius
+from push_model.limit_surface import GRAVITY
 from push_model.outlines import inset
 from push_model.specs import ObjectSpec
 from sim_bridge.collision_groups import OBJECT, SUPPORT, set_group
@@ -50,10 +50,9 @@ class ObjectBody:
         self._client = client
         self.centre = spec.com
         """[m] The centre of mass in the frame that poses are of, the geometric one."""
-        shape = spec.geometry
         height = spec.height - _CLEARANCE
         hulls = _hulls(client, spec, height)
-        n, radius = spec.feet, uniform_pressure_radius(shape)
+        n, radius = spec.feet, spec.pressure_radius
         angle = (np.arange(n) + 0.5) * 2.0 * math.pi / n
         foot = pb.createCollisionShape(pb.GEOM_SPHERE, radius=_FOOT_RADIUS, physicsClientId=client)
         base = hulls[0] if len(hulls) == 1 else -1

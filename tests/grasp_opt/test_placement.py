@@ -81,7 +81,7 @@ def test_no_placement_of_a_finer_grid_is_better(name, count):
         grid = placer.grid({2: 90, 3: 36}[count])
         costs = [placer.cost(way, 1e-4) for way in grid]
         assert len(grid) > 400 and best.cost <= min(costs) * 1.001
-        assert placer.allowed(best.way)
+        assert placer.allowed(best.way[None]).all()
         assert placer.outline.from_corner(best.way).min() >= FEW.corner
 
 
