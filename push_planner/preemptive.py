@@ -98,9 +98,15 @@ def plan_after_preemptive_push(
     offers += yield from turning_search(planner.scene, centre, robot, most)
     if not offers:
         check_way(planner.scene, start, robot)
+        raise PlanningFailed(
+            PlanError.NO_PUSH_SEQUENCE,
+            "the object is stuck at the start: no stable push leads away from there"
+            + (", and no push on a corner turns it" if most else "")
+            + "; clear the space around it",
+        )
     yield Progress("pre-emptive pushes", None)
     least = planner.lower_bound(start, goal)
-    failure = "no push away from the start was found"
+    failure = ""
     for number, offer in enumerate(offers, 1):
         stage = f"after pre-emptive push {number} of {len(offers)}"
         rest: PushPlan | None = None

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from push_model import se2
 from push_model.arrays import Array
@@ -162,6 +163,20 @@ class PushGraph:
                 if self.worth_leaving_for(side, pose):
                     found += self.push(0, pose, side, statistics) is not None
         return found
+
+    def joined(self, goal: bool) -> NDArray[np.int64]:
+        """Numbers of the poses that the pushes found so far join to the start, or to the goal."""
+        pairs = [(a, b) for (a, b, _), step in self._pushes.items() if step is not None]
+        follow: dict[int, set[int]] = {}
+        for first, last in pairs:
+            follow.setdefault(last if goal else first, set()).add(first if goal else last)
+        end = len(self.poses) - 1 if goal else 0
+        found, new = {end}, [end]
+        while new:
+            more = follow.get(new.pop(), set()) - found
+            found |= more
+            new += more
+        return np.array(sorted(found - {end}), dtype=np.int64)
 
     def worth_leaving_for(self, side: int, pose: int) -> bool:
         """Whether a push from the start to a pose is worth computing.

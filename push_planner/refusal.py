@@ -10,10 +10,13 @@ import numpy as np
 from push_model import se2
 from push_model.arrays import Array
 from push_planner.guide_path import origin_floor
-from push_planner.push_graph import SearchStatistics
+from push_planner.push_graph import PushGraph, SearchStatistics
 from push_planner.push_plan import PlanError, PlanningFailed
 from push_planner.robot_path import has_way
 from push_planner.scene import PushScene
+
+_STUCK = 4.0
+"""Circumradii of the object: if sequences of pushes lead no farther from an end, it is told."""
 
 
 def _told(pose: Array) -> str:
@@ -94,7 +97,7 @@ def check_way(scene: PushScene, start: Array, robot: Array | None) -> None:
 
 
 def why_not(
-    scene: PushScene,
+    graph: PushGraph,
     start: Array,
     goal: Array,
     statistics: SearchStatistics,
@@ -104,10 +107,11 @@ def why_not(
 ) -> str:
     """What the searches have found out if they ended without a plan.
 
-    ways: whether any push was found that leaves the start, and any that ends at the goal. poses:
-    number of object poses that were tried. widest: [m] clearance of the widest guide path found.
+    graph: of the last search. ways: whether any push was found that leaves the start, and any that
+    ends at the goal. poses: number of object poses that were tried. widest: [m] clearance of the
+    widest guide path found.
     """
-    solved, feasible = statistics.solved, statistics.feasible
+    scene, solved, feasible = graph.scene, statistics.solved, statistics.feasible
     tried = f"of {solved} pushes that were tried, {feasible} are free of collisions"
     for found, pose, what in (
         (ways[0], start, "away from the start"),
@@ -115,9 +119,21 @@ def why_not(
     ):
         if not found:
             return f"no push {what} {_told(pose)} was found; {tried}; clear the space there"
+    reason = (
+        f"no sequence of pushes from start to goal was found among {poses} poses of the object; "
+        f"{tried}"
+    )
+    for number, pose, what in (
+        (0, start, "the pushes that leave the start {} lead no farther than {:.0f} mm from it"),
+        (-1, goal, "the pushes that lead to the goal {} begin no farther than {:.0f} mm from it"),
+    ):
+        joined = graph.poses[graph.joined(goal=number < 0), :2]
+        farthest = float(np.hypot(*(joined - graph.poses[number, :2]).T).max(initial=0.0))
+        if farthest < _STUCK * scene.shape.circumradius:
+            told = what.format(_told(pose), 1e3 * farthest)
+            return f"{reason}; {told}; clear the space there"
     needed = 2e3 * (origin_floor(scene.shape) + scene.settings.safety_distance)
     return (
-        f"no sequence of pushes from start to goal was found among {poses} poses of the object; "
-        f"{tried}; the widest way that was searched is {2e3 * widest:.0f} mm wide at its narrowest "
-        f"place, and the object needs at least {needed:.0f} mm"
+        f"{reason}; the widest way that was searched is {2e3 * widest:.0f} mm wide at its "
+        f"narrowest place, and the object needs at least {needed:.0f} mm"
     )

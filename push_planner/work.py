@@ -7,7 +7,7 @@ import numpy as np
 
 from push_model.arrays import Array
 from push_planner.guide_path import GuidePath
-from push_planner.push_graph import SearchStatistics
+from push_planner.push_graph import PushGraph, SearchStatistics
 from push_planner.push_plan import PlanError, PlanningFailed, PlanStatistics
 from push_planner.settings import PlannerSettings
 
@@ -20,6 +20,7 @@ class Work:
         self.random = np.random.default_rng(seed)
         self.statistics = SearchStatistics()
         self.iterations = self.poses = 0
+        self.graph: PushGraph | None = None  # of the last search
         self.least = 0.0  # [s] lower bound of the cost of a plan
         self.ways_out = self.ways_in = False  # whether any push leaves the start, ends at the goal
         self.left = settings.total_expansions
