@@ -97,7 +97,9 @@ def test_an_object_that_no_push_leads_away_is_turned_first(planner):
 @pytest.mark.parametrize("changes", [{"max_turning": 0}, {"planner": "thesis"}])
 def test_without_them_it_is_refused(scenario, robot, box, changes):
     planner = PushPlanner(PlannerSettings(**changes), scenario.grid, robot, box)
-    with pytest.raises(PlanningFailed, match="stuck at the start: no stable push leads away from there; clear"):
+    with pytest.raises(
+        PlanningFailed, match="stuck at the start: no stable push leads away from there; clear"
+    ):
         last(plan_after_preemptive_push(planner, STUCK, GOAL, 1))
 
 
