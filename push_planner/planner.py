@@ -153,7 +153,6 @@ class PushPlanner:
             graph = self._graph(start, goal, guide, attempt, count, around, work)
             work.poses += len(graph.poses) - 2
             if not graph.leave(work.statistics, enough=1):
-                work.graph = work.graph or graph
                 continue
             work.graph, work.ways_out = graph, True
             # Greedier when that does not end; what has been tried by then is remembered.
@@ -254,8 +253,7 @@ class PushPlanner:
     def _refusal(self, ends: _Ends, guides: Sequence[GuidePath], work: Work) -> PlanningFailed:
         widest = max(guide.clearance for guide in guides)
         ways = work.ways_out, work.ways_in
-        assert work.graph is not None
-        reason = why_not(work.graph, *ends, work.statistics, ways, work.poses, widest)
+        reason = why_not(self.scene, *ends, work.statistics, ways, work.poses, widest, work.graph)
         shut, sides = sides_shut_off(self.scene, ends[0], work.robot)
         if shut:
             reason += f"; the robot has no way to {shut} of the {sides} sides that have room"
@@ -268,7 +266,7 @@ class PushPlanner:
         start, goal = (self.scene.item.mass_pose(pose) for pose in ends)
         poses = poses_on(self.scene, guide).free(self.scene)
         graph = PushGraph(self.scene, start, goal, poses, np.inf)
-        work.graph, work.poses = graph, len(poses.poses)
+        work.poses = len(poses.poses)
         search = ThesisSearch(graph, work.left)
         for _ in search.run(work.statistics):
             yield Progress("push search", None)

@@ -15,8 +15,7 @@ from push_planner.push_plan import PlanError, PlanningFailed
 from push_planner.robot_path import has_way
 from push_planner.scene import PushScene
 
-_STUCK = 4.0
-"""Circumradii of the object: if sequences of pushes lead no farther from an end, it is told."""
+_STUCK = 4.0  # circumradii of the object; if sequences of pushes stay nearer to an end, it is told
 
 
 def _told(pose: Array) -> str:
@@ -97,21 +96,24 @@ def check_way(scene: PushScene, start: Array, robot: Array | None) -> None:
 
 
 def why_not(
-    graph: PushGraph,
+    scene: PushScene,
     start: Array,
     goal: Array,
     statistics: SearchStatistics,
     ways: tuple[bool, bool],
     poses: int,
     widest: float,
+    graph: PushGraph | None,
 ) -> str:
     """What the searches have found out if they ended without a plan.
 
-    graph: of the last search. ways: whether any push was found that leaves the start, and any that
-    ends at the goal. poses: number of object poses that were tried. widest: [m] clearance of the
-    widest guide path found.
+    ways: whether any push was found that leaves the start, and any that ends at the goal. poses:
+    number of object poses that were tried. widest: [m] clearance of the widest guide path found.
+    graph: of the last search; None if it does not try every push that may be part of a plan.
     """
-    scene, solved, feasible = graph.scene, statistics.solved, statistics.feasible
+    if graph is not None:
+        graph.leave(statistics)  # all pushes, not only the first that is found
+    solved, feasible = statistics.solved, statistics.feasible
     tried = f"of {solved} pushes that were tried, {feasible} are free of collisions"
     for found, pose, what in (
         (ways[0], start, "away from the start"),
@@ -123,17 +125,24 @@ def why_not(
         f"no sequence of pushes from start to goal was found among {poses} poses of the object; "
         f"{tried}"
     )
-    for number, pose, what in (
-        (0, start, "the pushes that leave the start {} lead no farther than {:.0f} mm from it"),
-        (-1, goal, "the pushes that lead to the goal {} begin no farther than {:.0f} mm from it"),
-    ):
-        joined = graph.poses[graph.joined(goal=number < 0), :2]
-        farthest = float(np.hypot(*(joined - graph.poses[number, :2]).T).max(initial=0.0))
-        if farthest < _STUCK * scene.shape.circumradius:
-            told = what.format(_told(pose), 1e3 * farthest)
-            return f"{reason}; {told}; clear the space there"
+    stuck = "" if graph is None else _stuck(graph, start, goal)
+    if stuck:
+        return f"{reason}; {stuck}; clear the space there"
     needed = 2e3 * (origin_floor(scene.shape) + scene.settings.safety_distance)
     return (
         f"{reason}; the widest way that was searched is {2e3 * widest:.0f} mm wide at its "
         f"narrowest place, and the object needs at least {needed:.0f} mm"
     )
+
+
+def _stuck(graph: PushGraph, start: Array, goal: Array) -> str:
+    """That all sequences of pushes from an end stay beside it, if so."""
+    for at_goal, pose, what in (
+        (False, start, "the pushes found to leave the start {} lead no farther than {:.0f} mm"),
+        (True, goal, "the pushes found to lead to the goal {} begin no farther than {:.0f} mm"),
+    ):
+        joined, end = graph.joined(at_goal), graph.poses[-1 if at_goal else 0, :2]
+        farthest = float(np.hypot(*(graph.poses[joined, :2] - end).T).max(initial=0.0))
+        if len(joined) and farthest < _STUCK * graph.scene.shape.circumradius:
+            return f"{what.format(_told(pose), 1e3 * farthest)} from it"
+    return ""

@@ -20,7 +20,7 @@ class Work:
         self.random = np.random.default_rng(seed)
         self.statistics = SearchStatistics()
         self.iterations = self.poses = 0
-        self.graph: PushGraph | None = None  # of the last search
+        self.graph: PushGraph | None = None  # of the last search out of the start
         self.least = 0.0  # [s] lower bound of the cost of a plan
         self.ways_out = self.ways_in = False  # whether any push leaves the start, ends at the goal
         self.left = settings.total_expansions

@@ -57,7 +57,7 @@ def test_what_an_exhaustive_search_solves_is_solved(robot, box, kind, count, par
 def test_starts_beside_a_wall_have_plans_after_a_push_on_a_corner(robot, box, number):
     problem = list(problems_of("gap", box, number + 1, 2))[-1]
     planner = PushPlanner(PlannerSettings(), rasterise(problem.world), robot, box)
-    with pytest.raises(PlanningFailed, match=r"pushes that leave the start .* clear the space"):
+    with pytest.raises(PlanningFailed, match=r"pushes found to leave the start .* clear the space"):
         planner.solve(problem.start, problem.goal)
     assert after_first_push(planner, problem.start, problem.goal)
 

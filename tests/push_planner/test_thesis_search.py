@@ -105,6 +105,7 @@ def test_few_pushes_end_it_with_the_reason():
     with pytest.raises(PlanningFailed, match="no sequence of pushes") as error:
         planner.solve(start_of(scenario), scenario.goal)
     assert error.value.code is PlanError.NO_PUSH_SEQUENCE
+    assert "the start" not in str(error.value), "three pushes do not tell that it is stuck"
 
 
 def rescued(planner, start, goal, seed):
