@@ -5,6 +5,7 @@ numpy, scipy and compiled kernels (numba); imports nothing else of the project. 
 REP-103 axes.
 """
 
+from push_model import kernel_cache as kernel_cache  # before any file with kernels
 from push_model import se2
 from push_model.coulomb import cone_angle, cone_edges, in_cone
 from push_model.grasp import grasp_matrix, line_contact_grasp

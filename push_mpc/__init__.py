@@ -1,5 +1,6 @@
 """Predictive controllers for pushing and for free motion, and the tracker around them; 2.4."""
 
+from push_model import kernel_cache as kernel_cache  # before any file with kernels
 from push_mpc.contact_force_mpc import ContactForceMpc
 from push_mpc.controller import Contact, MpcResult, PredictiveController, Reference
 from push_mpc.controllers import CONTROLLERS, ControllerKind, controller_kind

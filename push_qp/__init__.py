@@ -1,5 +1,6 @@
 """Quadratic programmes of predictive controllers, and one interface for all their solvers."""
 
+from push_model import kernel_cache as kernel_cache  # before any file with kernels
 from push_qp.active_set import ActiveSetBackend
 from push_qp.backends import BACKENDS, backend
 from push_qp.daqp_backend import DaqpBackend
