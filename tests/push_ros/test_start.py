@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -18,12 +19,22 @@ SCENARIO = ["--ros-args", "-p", "scenario:=short"]
 def test_a_signal_while_a_node_loads_ends_it_without_a_traceback(domain, number):
     environment = prepare_environment(dict(os.environ))
     line = command_of("push_planner.node", SCENARIO)
-    for moment in (0.2, 0.4, 0.8, 1.2):  # [s] after the start; python itself takes up to 0.1
+    for moment in (0.0, 0.2, 0.4, 0.8, 1.2):  # [s] after it catches signals
         process = subprocess.Popen(line, env=environment, stderr=subprocess.PIPE, text=True)
+        while not catches(process.pid, signal.SIGTERM):
+            assert process.poll() is None
+            time.sleep(0.005)
         time.sleep(moment)
         process.send_signal(number)
         _, said = process.communicate(timeout=60)
         assert process.returncode == 0 and "Traceback" not in said, said
+
+
+def catches(pid, number):
+    """Whether a process has a handler of a signal."""
+    lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+    caught = next(int(line.split()[1], 16) for line in lines if line.startswith("SigCgt:"))
+    return bool(caught >> (number - 1) & 1)
 
 
 def test_a_module_that_cannot_be_loaded_says_so(domain):
