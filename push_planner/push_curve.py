@@ -19,23 +19,39 @@ _COARSE, _DENSE = 41, 321
 _GRID = 10
 _STARTS = 3
 _ROUNDS = 100  # of a compass search; few need 40, but one can creep to k = infinity
+_DIRECTIONS = 12  # of its steps
+_TINY = 1e-12  # [m^3] keeps the curvature at a cusp finite
 _SHORTEST = 0.02  # [m] least k_i, k_f; (2.6)
 
 
 def basis_rows(n: int) -> Array:
-    """Rows: s' and s'' coefficients of (end point, k_f, k_i) with the start at the origin."""
+    """``(6, n)``: the coefficients of the end point, k_f and k_i in s', then those in s'', at n
+    places, with the start at the origin."""
     s = np.linspace(0.0, 1.0, n)
     f1, g1 = 3 * s**2 - 2 * s, (s - 1) ** 2 + 2 * s * (s - 1)
     f2, g2 = 6 * s - 2, 6 * s - 4
-    return np.ascontiguousarray(np.array([3 * s**2 - 3 * f1, f1, g1, 6 * s - 3 * f2, f2, g2]).T)
+    return np.array([3 * s**2 - 3 * f1, f1, g1, 6 * s - 3 * f2, f2, g2])
 
 
 BASIS_COARSE, BASIS_DENSE = basis_rows(_COARSE), basis_rows(_DENSE)
-"""Rows for ``solve_curve``: of the samples that it searches with, and of the final check."""
+"""For ``solve_curve``: of the samples that it searches with, and of the final check."""
 
 
-@numba.njit(cache=True, fastmath=True)
-def _evaluate(
+@numba.njit(cache=True, fastmath=True, error_model="numpy")
+def _length(ki: float, kf: float, x: float, y: float, c: float, s: float, basis: Any) -> float:
+    """Arc length [m] (2.5)."""
+    n = basis.shape[1]
+    fx, fy = kf * c, kf * s
+    length = 0.0
+    for i in range(n):
+        dx = basis[0, i] * x + basis[1, i] * fx + basis[2, i] * ki
+        dy = basis[0, i] * y + basis[1, i] * fy
+        length += math.sqrt(dx * dx + dy * dy)
+    return float((length - 0.5 * (ki + kf)) / (n - 1))
+
+
+@numba.njit(cache=True, fastmath=True, error_model="numpy")
+def _holds(
     ki: float,
     kf: float,
     x: float,
@@ -45,27 +61,59 @@ def _evaluate(
     low: float,
     high: float,
     basis: Any,
-) -> tuple[float, float]:
-    """Arc length [m] (2.5) and worst curvature violation [1/m] (2.7)."""
-    n = basis.shape[0]
-    length = 0.0
-    worst = -1e9
-    before = 0.0
-    for i in range(n):
-        dx = basis[i, 0] * x + basis[i, 1] * kf * c + basis[i, 2] * ki
-        dy = basis[i, 0] * y + basis[i, 1] * kf * s
-        ddx = basis[i, 3] * x + basis[i, 4] * kf * c + basis[i, 5] * ki
-        ddy = basis[i, 3] * y + basis[i, 4] * kf * s
+) -> bool:
+    """Whether ``_violation`` is not positive. It counts samples because a compiler vectorises sums,
+    but not maxima."""
+    fx, fy = kf * c, kf * s
+    beyond = 0
+    for i in range(basis.shape[1]):
+        dx = basis[0, i] * x + basis[1, i] * fx + basis[2, i] * ki
+        dy = basis[0, i] * y + basis[1, i] * fy
+        ddx = basis[3, i] * x + basis[4, i] * fx + basis[5, i] * ki
+        ddy = basis[3, i] * y + basis[4, i] * fy
         q = dx * dx + dy * dy
-        speed = math.sqrt(q)
-        kappa = (dx * ddy - dy * ddx) / (q * speed + 1e-12)
-        violation = max(kappa - high, low - kappa)
-        if violation > worst:
-            worst = violation
-        if i > 0:
-            length += 0.5 * (before + speed)
-        before = speed
-    return length / (n - 1), worst
+        bend, cube = dx * ddy - dy * ddx, q * math.sqrt(q) + _TINY
+        beyond += (bend > high * cube) | (bend < low * cube)
+    return beyond == 0
+
+
+@numba.njit(cache=True, fastmath=True, error_model="numpy")
+def _violation(
+    ki: float,
+    kf: float,
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    low: float,
+    high: float,
+    basis: Any,
+    bends: Any,
+) -> float:
+    """Worst curvature violation [1/m] (2.7). bends: ``(n,)`` room for the curvatures."""
+    fx, fy = kf * c, kf * s
+    n = basis.shape[1]
+    for i in range(n):
+        dx = basis[0, i] * x + basis[1, i] * fx + basis[2, i] * ki
+        dy = basis[0, i] * y + basis[1, i] * fy
+        ddx = basis[3, i] * x + basis[4, i] * fx + basis[5, i] * ki
+        ddy = basis[3, i] * y + basis[4, i] * fy
+        q = dx * dx + dy * dy
+        bends[i] = (dx * ddy - dy * ddx) / (q * math.sqrt(q) + _TINY)
+    most, least = -1e9, 1e9
+    for i in range(n):
+        most = max(most, bends[i])
+        least = min(least, bends[i])
+    return max(most - high, low - least)
+
+
+@numba.njit(cache=True)
+def _compass(step: float, factors: Any) -> None:
+    """``(n, 2)`` factors of k_i and k_f for steps of one size in n directions, in log(k)."""
+    for k in range(len(factors)):
+        angle = k * (2.0 * math.pi / len(factors))
+        factors[k, 0] = math.exp(step * math.cos(angle))
+        factors[k, 1] = math.exp(step * math.sin(angle))
 
 
 @numba.njit(cache=True, fastmath=True)
@@ -83,20 +131,22 @@ def _refine(
     basis: Any,
 ) -> tuple[float, float, float]:
     """Compass search for the shortest feasible curve, in log(k)."""
+    factors = np.empty((_DIRECTIONS, 2))
+    _compass(step, factors)
     for _ in range(_ROUNDS):
         if step <= 1e-3:
             break
         found = False
-        for k in range(12):
-            a = k * 0.5235987755982988
-            mi = max(_SHORTEST, ki * math.exp(step * math.cos(a)))
-            mf = max(_SHORTEST, kf * math.exp(step * math.sin(a)))
-            length, violation = _evaluate(mi, mf, x, y, c, s, low, high, basis)
-            if violation <= 0.0 and length < best - 1e-9:
+        for k in range(_DIRECTIONS):
+            mi = max(_SHORTEST, ki * factors[k, 0])
+            mf = max(_SHORTEST, kf * factors[k, 1])
+            length = _length(mi, mf, x, y, c, s, basis)
+            if length < best - 1e-9 and _holds(mi, mf, x, y, c, s, low, high, basis):
                 best, ki, kf = length, mi, mf
                 found = True
         if not found:
             step *= 0.4
+            _compass(step, factors)
     return ki, kf, best
 
 
@@ -115,20 +165,22 @@ def _reduce_violation(
     basis: Any,
 ) -> tuple[float, float, float]:
     """Compass search for a feasible curve; ends as soon as there is one."""
+    factors, bends = np.empty((_DIRECTIONS, 2)), np.empty(basis.shape[1])
+    _compass(step, factors)
     for _ in range(_ROUNDS):
         if step <= 1e-3 or worst <= 0.0:
             break
         found = False
-        for k in range(12):
-            a = k * 0.5235987755982988
-            mi = max(_SHORTEST, ki * math.exp(step * math.cos(a)))
-            mf = max(_SHORTEST, kf * math.exp(step * math.sin(a)))
-            _, violation = _evaluate(mi, mf, x, y, c, s, low, high, basis)
+        for k in range(_DIRECTIONS):
+            mi = max(_SHORTEST, ki * factors[k, 0])
+            mf = max(_SHORTEST, kf * factors[k, 1])
+            violation = _violation(mi, mf, x, y, c, s, low, high, basis, bends)
             if violation < worst:
                 worst, ki, kf = violation, mi, mf
                 found = True
         if not found:
             step *= 0.4
+            _compass(step, factors)
     return ki, kf, worst
 
 
@@ -152,6 +204,42 @@ def _lowest_minimum(values: Any) -> tuple[int, int]:
 
 
 @numba.njit(cache=True, fastmath=True)
+def _in_a_valley(
+    ratio: float,
+    step: float,
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    low: float,
+    high: float,
+    basis: Any,
+) -> tuple[float, float, float]:
+    """A feasible curve where no point of the grid is: the valley is narrower than a cell. Descends
+    from the lowest local minima of the violation. The length is 1e18 if there is none."""
+    violations, bends = np.empty((_GRID, _GRID)), np.empty(basis.shape[1])
+    mi = _SHORTEST
+    for i in range(_GRID):
+        mf = _SHORTEST
+        for j in range(_GRID):
+            violations[i, j] = _violation(mi, mf, x, y, c, s, low, high, basis, bends)
+            mf *= ratio
+        mi *= ratio
+    ki, kf = _SHORTEST, _SHORTEST
+    for _ in range(_STARTS):
+        i, j = _lowest_minimum(violations)
+        if i < 0:
+            break
+        least = violations[i, j]
+        violations[i, j] = math.inf
+        ki, kf = _SHORTEST * ratio**i, _SHORTEST * ratio**j
+        ki, kf, least = _reduce_violation(ki, kf, least, step, x, y, c, s, low, high, basis)
+        if least <= 0.0:
+            return ki, kf, _length(ki, kf, x, y, c, s, basis)
+    return ki, kf, 1e18
+
+
+@numba.njit(cache=True, fastmath=True)
 def solve_curve(
     x: float, y: float, c: float, s: float, low: float, high: float, coarse: Any, dense: Any
 ) -> tuple[float, float, float, bool]:
@@ -160,54 +248,43 @@ def solve_curve(
     top = 6.0 * distance + 1.0
     ratio = (top / _SHORTEST) ** (1.0 / (_GRID - 1))
     best, ki, kf = 1e18, _SHORTEST, _SHORTEST
-    violations = np.empty((_GRID, _GRID))
     mi = _SHORTEST
-    for i in range(_GRID):
+    for _ in range(_GRID):
         mf = _SHORTEST
-        for j in range(_GRID):
-            length, violation = _evaluate(mi, mf, x, y, c, s, low, high, coarse)
-            violations[i, j] = violation
-            if violation <= 0.0 and length < best:
-                best, ki, kf = length, mi, mf
+        for _ in range(_GRID):
+            if _holds(mi, mf, x, y, c, s, low, high, coarse):
+                length = _length(mi, mf, x, y, c, s, coarse)
+                if length < best:
+                    best, ki, kf = length, mi, mf
             mf *= ratio
         mi *= ratio
     step = 0.5 * math.log(ratio)
-    # No cell is feasible: the valley is narrower than a cell; go down from the lowest local minima.
-    for _ in range(_STARTS):
-        if best < 1e17:
-            break
-        i, j = _lowest_minimum(violations)
-        if i < 0:
-            break
-        least = violations[i, j]
-        violations[i, j] = math.inf
-        ki, kf = _SHORTEST * ratio**i, _SHORTEST * ratio**j
-        ki, kf, least = _reduce_violation(ki, kf, least, step, x, y, c, s, low, high, coarse)
-        if least <= 0.0:
-            best, _ = _evaluate(ki, kf, x, y, c, s, low, high, coarse)
+    if best > 1e17:
+        ki, kf, best = _in_a_valley(ratio, step, x, y, c, s, low, high, coarse)
     if best > 1e17:
         return ki, kf, 0.0, False
     ki, kf, best = _refine(ki, kf, best, step, x, y, c, s, low, high, coarse)
     # Peaks between the coarse samples: tighten by what they exceed the limits, solve again.
     tight_low, tight_high = low, high
+    bends = np.empty(dense.shape[1])
     for _ in range(6):
-        length, violation = _evaluate(ki, kf, x, y, c, s, low, high, dense)
-        if violation <= 0.0:
-            return ki, kf, length, True
+        if _holds(ki, kf, x, y, c, s, low, high, dense):
+            return ki, kf, _length(ki, kf, x, y, c, s, dense), True
+        violation = _violation(ki, kf, x, y, c, s, low, high, dense, bends)
         tight_low += 1.2 * violation + 1e-4 * high
         tight_high -= 1.2 * violation + 1e-4 * high
         if tight_low >= 0.0 or tight_high <= 0.0:
             break
-        _, worst = _evaluate(ki, kf, x, y, c, s, tight_low, tight_high, coarse)
+        worst = _violation(ki, kf, x, y, c, s, tight_low, tight_high, coarse, bends)
         ki, kf, worst = _reduce_violation(
             ki, kf, worst, 0.2, x, y, c, s, tight_low, tight_high, coarse
         )
         if worst > 0.0:
             break
-        best, _ = _evaluate(ki, kf, x, y, c, s, low, high, coarse)
+        best = _length(ki, kf, x, y, c, s, coarse)
         ki, kf, best = _refine(ki, kf, best, 0.05, x, y, c, s, tight_low, tight_high, coarse)
-    length, violation = _evaluate(ki, kf, x, y, c, s, low, high, dense)
-    return ki, kf, length, violation <= 0.0
+    feasible = _holds(ki, kf, x, y, c, s, low, high, dense)
+    return ki, kf, _length(ki, kf, x, y, c, s, dense), feasible
 
 
 @dataclass(frozen=True)

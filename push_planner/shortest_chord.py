@@ -47,11 +47,11 @@ def _worst(
     The limits are 1 to the left and ``low`` (negative) to the right.
     """
     worst = 0.0
-    for i in range(basis.shape[0]):
-        dx = basis[i, 0] * x + basis[i, 1] * kf * c + basis[i, 2] * ki
-        dy = basis[i, 0] * y + basis[i, 1] * kf * s
-        ddx = basis[i, 3] * x + basis[i, 4] * kf * c + basis[i, 5] * ki
-        ddy = basis[i, 3] * y + basis[i, 4] * kf * s
+    for i in range(basis.shape[1]):
+        dx = basis[0, i] * x + basis[1, i] * kf * c + basis[2, i] * ki
+        dy = basis[0, i] * y + basis[1, i] * kf * s
+        ddx = basis[3, i] * x + basis[4, i] * kf * c + basis[5, i] * ki
+        ddy = basis[3, i] * y + basis[4, i] * kf * s
         q = dx * dx + dy * dy
         kappa = (dx * ddy - dy * ddx) / (q * math.sqrt(q) + 1e-12)
         worst = max(worst, kappa, kappa / low)

@@ -10,6 +10,7 @@ from scipy.optimize import minimize
 
 from push_model import se2
 from push_planner import PushCurve, shortest_push_curve
+from push_planner.push_curve import BASIS_COARSE, _holds, _length, _violation
 
 angles = st.floats(-1.5, 1.5)
 starts = st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(-3, 3)).map(np.array)
@@ -36,6 +37,29 @@ def test_boundary_conditions_of_the_corrected_formula(start, distance, bearing, 
     last = (points[-1] - points[-2]) * 20000
     assert first == pytest.approx(ki * np.array([math.cos(start[2]), math.sin(start[2])]), abs=1e-3)
     assert last == pytest.approx(kf * np.array([math.cos(end[2]), math.sin(end[2])]), abs=1e-3)
+
+
+def test_lengths_and_curvatures_of_the_search_are_those_of_the_curve():
+    """1000 cubics: compiled sums over samples, against the same samples of ``PushCurve``."""
+    random = np.random.default_rng(5)
+    bends = np.empty(41)
+    held = 0
+    for _ in range(1000):
+        end = finish(np.zeros(3), random.uniform(0.2, 1.5), *random.uniform(-1.2, 1.2, 2))
+        ki, kf = random.uniform(0.1, 3.0, 2)
+        low, high = -random.uniform(1.0, 20.0), random.uniform(1.0, 20.0)
+        known = *end[:2], math.cos(end[2]), math.sin(end[2])
+        points, _, kappa = PushCurve(np.zeros(3), end, ki, kf, 0.0).sample(41)
+        worst = max(kappa.max() - high, low - kappa.min())
+        violation = _violation(ki, kf, *known, low, high, BASIS_COARSE, bends)
+        assert violation == pytest.approx(worst, rel=1e-4, abs=1e-6)
+        if abs(worst) > 1e-3:
+            assert _holds(ki, kf, *known, low, high, BASIS_COARSE) == (worst < 0.0)
+        held += worst < 0.0
+        chords = np.hypot(*np.diff(points, axis=0).T).sum()
+        length = _length(ki, kf, *known, BASIS_COARSE)
+        assert chords <= length * (1.0 + 1e-3) and length == pytest.approx(chords, rel=0.02)
+    assert 100 < held < 900
 
 
 @settings(deadline=None)
