@@ -3,7 +3,8 @@
 The rivals of the studies and the swarm with own sensing are such laws. Each is a file that says how
 robots move; the rest is the same for all. A law that leads the object round walls says how long the
 way is that is left (``WalledLaw``), because the object may have to go away from its target first. A
-law whose robots have memories of their own is told which robots it moves (``NamedLaw``).
+law whose robots have memories of their own is told which robots it moves (``NamedLaw``). A law that
+steers robots with two wheels itself says how fast they drive and turn (``TwistLaw``).
 """
 
 import math
@@ -85,6 +86,15 @@ class WalledLaw(Protocol):
     def left(self, pose: Array) -> float:
         """[m] of way that an object with its centre of mass at ``(3,)`` has to its target; inf if
         it is not known yet."""
+        ...
+
+
+@runtime_checkable
+class TwistLaw(Protocol):
+    """A law that steers robots with two wheels itself."""
+
+    def twists(self, time: float, pose: Array, robots: Array) -> Array:
+        """``(n, 2)`` speeds ahead [m/s] and turn rates [rad/s]; see VelocityLaw."""
         ...
 
 
@@ -209,16 +219,23 @@ class OpenRoomMethod:
             if isinstance(self._law, NamedLaw):
                 self._law.meet(names)
             try:
-                chosen = self._law.velocities(seen.time, pose, robots - origin)
+                self._held = self._decided(self._law, seen.time, pose, robots - origin)
             except NoWay as problem:
                 self.end(JobError.PLANNING_FAILED, str(problem))
                 return Told()
-            fast = np.hypot(*chosen.T) / robot.max_speed
-            self._held = chosen / np.maximum(fast, 1.0)[:, None]
         told = self._held
-        if robot.kinematics is not None:
+        if robot.kinematics is not None and not isinstance(self._law, TwistLaw):
             told = robot.kinematics.follow(told, robots[:, 2], _LEAD)
         return Told({n: (float(a), float(b)) for n, (a, b) in zip(names, told, strict=True)})
+
+    def _decided(self, law: VelocityLaw, now: float, pose: Array, robots: Array) -> Array:
+        """``(n, 2)`` velocities, or twists of robots with two wheels whose law steers them."""
+        robot = self._arena.robot
+        if robot.kinematics is not None and isinstance(law, TwistLaw):
+            return law.twists(now, pose, robots)
+        chosen = law.velocities(now, pose, robots)
+        slowed: Array = chosen / np.maximum(np.hypot(*chosen.T) / robot.max_speed, 1.0)[:, None]
+        return slowed
 
     def _progresses(self, now: float, left: float) -> bool:
         if math.isnan(self._closer) or left < self._nearest - _CLOSER:

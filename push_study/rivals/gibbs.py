@@ -2,13 +2,14 @@
 
 Every robot draws its next velocity by a hundred steps of Metropolis and Hastings from a field of
 potentials: towards the object's outline where it hides the target, along it elsewhere, with its
-neighbours, away from walls. Constants are those of the code of July 2021, with which the recordings
-were made that the authors published beside it; later versions have others.
+neighbours, away from walls and from the outline that the object is to have at the goal. It drives
+ahead, and turns towards that velocity. Constants are those of the code of July 2021, with which the
+recordings were made that the authors published beside it; later versions have others.
 
 Reconstructed: the outline is scanned from where a robot is, not anew from where each sample would
 take it (3 mm on), and so is whether the object hides the target. A robot that goes in any direction
-is slowed as theirs is, by how far it would have to turn. Their time is ours times the ratio of
-speeds, so that robots are as fast as ours.
+moves along the velocity, and is slowed as theirs is, by how far it would have to turn. Robots that
+are slower than theirs do everything slower, in proportion.
 """
 
 import math
@@ -23,6 +24,7 @@ _SENSING, _SAFE, _MASS, _LARGEST = 0.5, 0.15, 5.0, 0.3
 _STEP, _PERIOD = 0.01, 1.0 / 15.0  # [s] by which samples look ahead; between decisions
 _STRAIGHT, _TURNING, _AHEAD = 0.12, 0.06, math.pi / 36.0  # [m/s], [m/s], [rad]
 _GAIN = 2.0  # of a drawn velocity
+_STEER, _TURN = 0.8, 1.8  # [1/s] turn rates by how far it has to turn: ahead, and otherwise
 _SAMPLES, _DEVIATION = 100, 0.05
 _BURNT = int(0.6 * (_SAMPLES + 1))
 _RAY, _WALL_RAY = 0.1, 0.2  # [rad] between the rays of a scan
@@ -41,40 +43,54 @@ class Gibbs:
         self._random = np.random.default_rng(arena.seed)
         self._next = -math.inf
         self._drawn = np.zeros((0, 2))  # in their units, as long as all that follows
+        outline = arena.item.geometry.outline
+        self._goal, self._extent = outline + arena.target, float(np.hypot(*outline.T).max())
+        self._pace = min(1.0, arena.speed / _STRAIGHT)
 
     def velocities(self, time: float, pose: Array, robots: Array) -> Array:
         """See VelocityLaw."""
-        faster = self._arena.speed / _STRAIGHT
+        self._decide(time, pose, robots)
+        speed, _ = self._steered(robots)
+        size = np.hypot(*self._drawn.T)
+        told: Array = self._drawn * (speed / np.maximum(size, 1e-12))[:, None]
+        return told
+
+    def twists(self, time: float, pose: Array, robots: Array) -> Array:
+        """See TwistLaw."""
+        self._decide(time, pose, robots)
+        return np.column_stack(self._steered(robots))
+
+    def _decide(self, time: float, pose: Array, robots: Array) -> None:
         if len(self._drawn) != len(robots):
             self._drawn = np.full((len(robots), 2), _LARGEST)  # as their robots begin
             self._next = -math.inf
         if time >= self._next:
-            self._next = time + _PERIOD / faster
+            period = _PERIOD / self._pace
+            self._next = (time if self._next < time - period else self._next) + period
             corners = se2.transform(pose, self._arena.item.geometry.outline)
             seen = self._neighbours(robots, corners)
             before = self._drawn.copy()
             for i in range(len(robots)):
                 self._drawn[i] = self._draw(i, robots, before, seen[i], corners)
-        return self._commands(robots) * faster
 
-    def _commands(self, robots: Array) -> Array:
-        """What is told to robots for the drawn velocities."""
+    def _steered(self, robots: Array) -> tuple[Array, Array]:
+        """``(n,)`` speeds ahead [m/s] and ``(n,)`` turn rates [rad/s]."""
         size = np.hypot(*self._drawn.T)
         turn = np.arctan2(self._drawn[:, 1], self._drawn[:, 0]) - robots[:, 2]
-        off = np.abs((turn + math.pi) % (2.0 * math.pi) - math.pi)
-        most = np.where(off > _AHEAD, _TURNING, _STRAIGHT)
-        told: Array = (
-            self._drawn * (np.minimum(_GAIN * size, most) / np.maximum(size, 1e-12))[:, None]
-        )
-        return told
+        off = (turn + math.pi) % (2.0 * math.pi) - math.pi
+        far = np.abs(off) > _AHEAD
+        speed = np.minimum(_GAIN * size, np.where(far, _TURNING, _STRAIGHT))
+        return self._pace * speed, self._pace * np.where(far, _TURN, _STEER) * off
 
     def _neighbours(self, robots: Array, corners: Array) -> Mask:
-        """``(n, n)`` who senses whom: near, and the object is not between."""
+        """``(n, n)`` who senses whom: near, and neither the object nor its outline at the goal is
+        between."""
         places = robots[:, :2]
         near = np.hypot(*(places[:, None] - places).transpose(2, 0, 1)) <= _SENSING
         np.fill_diagonal(near, False)
         for i, k in zip(*np.nonzero(np.triu(near)), strict=True):
-            if np.isfinite(_reach(places[i], (places[k] - places[i])[None], corners)[0]):
+            way = (places[k] - places[i])[None]
+            if any(np.isfinite(_reach(places[i], way, c)[0]) for c in (corners, self._goal)):
                 near[i, k] = near[k, i] = False
         found: Mask = near
         return found
@@ -148,13 +164,15 @@ class Gibbs:
 
     def _walls(self, robot: Array, there: Array) -> Array:
         half = 0.5 * np.array(self._arena.size)
-        if (half - np.abs(robot[:2]) > _SENSING).all():
+        from_goal = float(np.hypot(*(robot[:2] - self._arena.target)))
+        if (half - np.abs(robot[:2]) > _SENSING).all() and from_goal > _SENSING + self._extent:
             return np.zeros(len(there))
         angles = robot[2] + np.arange(0.0, 2.0 * math.pi, _WALL_RAY)
-        rays = np.column_stack([np.cos(angles), np.sin(angles)])
+        rays = _SENSING * np.column_stack([np.cos(angles), np.sin(angles)])
         with np.errstate(divide="ignore"):
-            reach = ((np.sign(rays) * half - robot[:2]) / rays).min(axis=1)
-        points = robot[:2] + np.clip(reach, 0.0, _SENSING)[:, None] * rays
+            reach = ((np.copysign(half, rays) - robot[:2]) / rays).min(axis=1)
+        reach = np.minimum(reach, _reach(robot[:2], rays, self._goal))
+        points = robot[:2] + np.clip(reach, 0.0, 1.0)[:, None] * rays
         away = np.hypot(*(there[:, None] - points).transpose(2, 0, 1)) + 1e-9
         near = away <= 0.9 * _SAFE
         U: Array = np.where(near, _potential(_WALL * away, _CHARGE), 0.0).sum(axis=1)

@@ -1,6 +1,7 @@
 """Other people's swarms, and the experiment that sets them beside ours."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from push_job.open_room import OpenRoom
 from push_model import se2
 from push_model.outlines import distance, inside
 from push_scenario.bodies import load_object
-from push_study.experiments import swarm_rivals
+from push_study.experiments import rival_papers, swarm_rivals
 from push_study.rivals.gibbs import Gibbs, _reach
 from push_study.rivals.global_input import GlobalInput
 from push_study.rivals.occlusion import Occlusion
@@ -68,6 +69,72 @@ def test_the_random_field_draws_robots_to_the_object_where_it_hides_the_target()
         gone.append(rival.velocities(0.0, HERE, robots)[0])
     assert np.mean(np.array(gone) @ toward) > 0.02
     assert np.hypot(*np.array(gone).T).max() <= 0.128 + 1e-9
+
+
+FAR = OpenRoom((9.0, 9.0), SQUARE, 0.05, 0.128, np.array([3.0, 3.0]), 1)  # nothing within reach
+AT_THE_WALL = np.array([4.0, -4.0, 0.0])
+
+
+@pytest.mark.parametrize(("speed", "pace"), [(0.128, 1.0), (0.25, 1.0), (0.06, 0.5)])
+def test_robots_of_the_random_field_steer_as_in_the_code_of_its_authors(speed, pace):
+    """Twice as fast as drawn, to a limit; the turn rate by how far the robot has to turn."""
+    arena = replace(FAR, speed=speed)
+    drawn = Gibbs(arena).velocities(0.0, AT_THE_WALL, np.zeros((1, 3)))[0]
+    direction = math.atan2(drawn[1], drawn[0])
+    for off in (-2.5, -0.5, -0.1, -0.08, 0.03, 0.08, 0.1, 1.5):
+        robots = np.array([[0.0, 0.0, direction - off]])
+        v, omega = Gibbs(arena).twists(0.0, AT_THE_WALL, robots)[0]
+        far = abs(off) > math.pi / 36.0
+        assert v == pytest.approx(pace * (0.06 if far else 0.12))  # it draws 0.3 m/s at first
+        assert omega == pytest.approx(pace * (1.8 if far else 0.8) * off)
+
+
+def test_the_random_field_decides_fifteen_times_a_second():
+    rival, drawn = Gibbs(FAR), []
+    for k in range(500):
+        drawn.append(rival.velocities(0.02 * k, AT_THE_WALL, np.zeros((1, 3)))[0])
+    changes = np.any(np.diff(drawn, axis=0) != 0.0, axis=1)
+    assert changes.sum() == pytest.approx(150, abs=2)
+
+
+def test_the_random_field_keeps_off_the_outline_at_the_goal_and_does_not_see_through_it():
+    """Robots in front of an edge of that outline, 10 cm and 30 cm off."""
+    rival = Gibbs(replace(FAR, target=np.zeros(2)))
+    edge = SQUARE.geometry.outline[:, 0].max()
+    there = np.array([[0.01, 0.0], [0.0, 0.0], [-0.01, 0.0]])
+    for off, some in ((0.10, True), (0.30, False)):
+        robot = np.array([edge + off, 0.0, 0.0])
+        U = rival._walls(robot, robot[:2] + there)
+        assert (U[0] < U[1] < U[2]) if some else (U == 0.0).all()
+    seen = rival._neighbours(
+        np.array([[-0.22, 0.1, 0.0], [0.22, 0.1, 0.0], [0.3, 0.3, 0.0]]),
+        se2.transform(AT_THE_WALL, SQUARE.geometry.outline),
+    )
+    assert not seen[0, 1] and not seen[1, 0] and seen[1, 2] and seen[2, 1]
+
+
+def test_robots_of_the_paper_start_apart_from_each_other_and_from_the_object():
+    outline = se2.transform(np.array(rival_papers.START), rival_papers._OBJECT.outline)
+    for seed in range(50):
+        places = rival_papers.starts(np.random.default_rng(seed), 20)[:, :2]
+        assert not inside(outline, places).any() and distance(outline, places).min() > 0.04
+        gaps = np.hypot(*(places[:, None] - places).transpose(2, 0, 1)) + np.eye(20)
+        assert gaps.min() > 0.2 and np.abs(places).max() <= 1.8
+
+
+@pytest.mark.long
+def test_equal_seeds_give_equal_runs_in_the_setting_of_the_paper(tmp_path, capsys):
+    task = rival_papers.PaperTask("gibbs-4", 1, str(tmp_path), "planar", "mild", 60.0)
+    rows = [rival_papers.trial(task) for _ in range(2)]
+    assert rows[0] == rows[1] and not rows[0]["success"]
+    assert 5.0 < rows[0]["first_motion_s"] < 60.0 and 0.1 < rows[0]["nearest_m"] < 1.69
+    reached = rows[0] | {"success": True, "duration_s": 400.0}
+    statistics = rival_papers.statistics([rows[0], reached])["gibbs-4"]
+    assert statistics["reached"] == 1 and statistics["of"] == 2
+    assert statistics["time_mean_s"] == 400.0 and statistics["published_mean_s"] == 446
+    options = StudyOptions(("gibbs-4",), 2, 1, tmp_path)
+    rival_papers.conclude(options, [task], [rows[0], reached])
+    assert "1 of 2" in capsys.readouterr().out
 
 
 def test_rays_of_the_random_field_end_at_the_outline():
