@@ -8,6 +8,8 @@ it: import it before a file with kernels.
 """
 
 import hashlib
+import sys
+from collections.abc import Iterator
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
@@ -28,41 +30,45 @@ PACKAGES = (
     "swarm_push",
 )
 """Kernels of these, and those that call them, are stamped like this."""
+_CONSTANT = (bool, int, float, complex, str, bytes, tuple, np.ndarray)
 
 
-def dependencies(function: FunctionType) -> dict[str, Any]:
-    """Kernels and constants that a function names, as far as they exist by now; in order."""
-    found: dict[str, Any] = {}
-    names = _names(function.__code__)
-    for name in sorted(names & function.__globals__.keys()):
-        value = function.__globals__[name]
-        if isinstance(value, ModuleType):
-            inside = {f"{name}.{n}": getattr(value, n) for n in sorted(names) if hasattr(value, n)}
-            found |= {n: v for n, v in inside.items() if isinstance(v, Dispatcher)}
-        elif isinstance(value, Dispatcher | bool | int | float | str | tuple | np.ndarray):
-            found[name] = value
+def modules_used(namespace: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Names and namespaces of the modules whose kernels the kernels of a namespace may call.
+
+    They are found by what is imported: a kernel may also call one that is defined only after it.
+    """
+    found: dict[str, dict[str, Any]] = {}
+    left = [namespace]
+    while left:
+        for value in list(left.pop().values()):
+            name = ""
+            if isinstance(value, Dispatcher):
+                name = value.py_func.__module__
+            elif isinstance(value, ModuleType) and _is_ours(value.__name__):
+                name = value.__name__
+            if name in sys.modules and name not in found and name != namespace["__name__"]:
+                found[name] = vars(sys.modules[name])
+                left.append(found[name])
     return found
 
 
-def _names(code: CodeType) -> set[str]:
-    inner = (_names(c) for c in code.co_consts if isinstance(c, CodeType))
-    return set(code.co_names).union(*inner)
+def _is_ours(module: str) -> bool:
+    return module.split(".")[0] in PACKAGES
 
 
-def _with_callees(function: FunctionType) -> list[FunctionType]:
-    """A function and all kernels that it calls, those that they call included."""
-    found: dict[int, FunctionType] = {}
-    left = [function]
-    while left:
-        f = left.pop()
-        if id(f) not in found:
-            found[id(f)] = f
-            left += [d.py_func for d in dependencies(f).values() if isinstance(d, Dispatcher)]
-    return list(found.values())
+def _facts(namespace: dict[str, Any], kernels: bool) -> Iterator[str]:
+    """Constants and, if they are asked for, kernels of a namespace, on which code may depend."""
+    for name in sorted(n for n in namespace if not n.startswith("__")):
+        value = namespace[name]
+        if isinstance(value, _CONSTANT) or (kernels and isinstance(value, Dispatcher)):
+            yield f"{name} = {_text(value)}"
 
 
 def _text(value: Any) -> str:
-    """What machine code depends on of a constant, of code or of a kernel."""
+    """The same for equal values in every process."""
+    if isinstance(value, set | frozenset):
+        return f"{{{', '.join(sorted(map(_text, value)))}}}"
     if isinstance(value, np.ndarray):
         return f"{value.dtype} {value.shape} {value.tobytes().hex()}"
     if isinstance(value, tuple):
@@ -71,11 +77,9 @@ def _text(value: Any) -> str:
         names = value.co_names, value.co_varnames
         return f"{value.co_code.hex()} {names} {_text(value.co_consts)}"
     if isinstance(value, Dispatcher):
-        function = value.py_func
-        return (
-            f"{function.__module__}.{function.__qualname__} {sorted(value.targetoptions.items())}"
-        )
-    return repr(value)
+        options = tuple(sorted(value.targetoptions.items()))
+        return f"{_text(value.py_func.__code__)} {_text(options)}"
+    return repr(value) if isinstance(value, _CONSTANT) or value is None else ""
 
 
 class _Stamped:
@@ -83,22 +87,20 @@ class _Stamped:
 
     def __init__(self, function: FunctionType, file: str) -> None:
         super().__init__(function, file)  # type: ignore[call-arg]
-        self._function = function
+        self._namespace = function.__globals__
 
     @classmethod
     def from_function(cls, function: FunctionType, file: str) -> Any:
-        """See numba. None if neither the kernel nor what it calls is of this project."""
-        if all(f.__module__.split(".")[0] not in PACKAGES for f in _with_callees(function)):
+        """See numba. None if neither the kernel nor what it may call is of this project."""
+        if not any(map(_is_ours, (function.__module__, *modules_used(function.__globals__)))):
             return None
         return super().from_function(function, file)  # type: ignore[misc]
 
     def get_source_stamp(self) -> tuple[bytes, bytes]:
         """See numba."""
-        digest = hashlib.sha256()
-        for function in _with_callees(self._function):
-            digest.update(_text(function.__code__).encode())
-            for name, value in dependencies(function).items():
-                digest.update(f"{name} = {_text(value)}".encode())
+        digest = hashlib.sha256("".join(_facts(self._namespace, False)).encode())
+        for name, namespace in sorted(modules_used(self._namespace).items()):
+            digest.update(f"{name}: {' '.join(_facts(namespace, True))}".encode())
         return super().get_source_stamp(), digest.digest()  # type: ignore[misc]
 
 
