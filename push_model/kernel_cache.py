@@ -61,7 +61,9 @@ def _facts(namespace: dict[str, Any], kernels: bool) -> Iterator[str]:
     """Constants and, if they are asked for, kernels of a namespace, on which code may depend."""
     for name in sorted(n for n in namespace if not n.startswith("__")):
         value = namespace[name]
-        if isinstance(value, _CONSTANT) or (kernels and isinstance(value, Dispatcher)):
+        if isinstance(value, type) and issubclass(value, tuple):  # kernels know fields by number
+            yield f"{name} has {getattr(value, '_fields', ())}"
+        elif isinstance(value, _CONSTANT) or (kernels and isinstance(value, Dispatcher)):
             yield f"{name} = {_text(value)}"
 
 

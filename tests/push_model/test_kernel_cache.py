@@ -24,7 +24,7 @@ def half(x):
 CALLER = """
 import numba
 from mine import callee
-from mine.constants import FACTOR, TABLE
+from mine.constants import FACTOR, TABLE, Pair
 
 @numba.njit(cache=True)
 def f(x):
@@ -56,13 +56,14 @@ def run(folder, packages=("mine",), seeds=count(1)):  # noqa: B008
     return float(out[0]), int(out[1]) > 0
 
 
-def write(folder, value=0.5, factor=1.0, table=(0.0, 3.0)):
+def write(folder, value=0.5, factor=1.0, table=(0.0, 3.0), fields="a b"):
     package = folder / "mine"
     package.mkdir(exist_ok=True)
     (package / "__init__.py").write_text("")
     (package / "callee.py").write_text(CALLEE.format(value=value))
     (package / "caller.py").write_text(CALLER)
     constants = f"import numpy as np\nFACTOR = {factor}\nTABLE = np.array({list(table)})\n"
+    constants += f"from collections import namedtuple\nPair = namedtuple('Pair', '{fields}')\n"
     (package / "constants.py").write_text(constants)
 
 
@@ -77,6 +78,8 @@ def test_a_kernel_is_compiled_anew_when_what_it_uses_of_other_files_changes(tmp_
     write(tmp_path, value=0.25, factor=2.0, table=(0.0, 4.0))
     assert run(tmp_path) == (8.0, False)
     assert run(tmp_path) == (8.0, True)
+    write(tmp_path, value=0.25, factor=2.0, table=(0.0, 4.0), fields="b a")
+    assert run(tmp_path)[1] is False
 
 
 def test_numba_alone_would_run_the_old_code(tmp_path):
