@@ -151,9 +151,10 @@ def test_every_node_publishes_diagnostics_and_counts_what_it_refuses(run):
         )
 
     assert run.spinner.until(lambda: refused("epuck1/controller") and refused("supervisor"), 10.0)
-    assert {"bridge", "planner", "epuck1/controller", "supervisor"} <= set(statuses)
+    names = {"bridge", "planner", "epuck1/controller", "supervisor"}
+    assert run.spinner.until(lambda: names <= set(statuses), 10.0), set(statuses)
     # FAULTS 23: this test is a second source of poses
-    assert statuses["bridge"].level == DiagnosticStatus.WARN
+    assert run.spinner.until(lambda: statuses["bridge"].level == DiagnosticStatus.WARN, 10.0)
     assert "2 publishers on /poses" in statuses["bridge"].message
     run.observer.destroy_publisher(publisher)
     assert run.spinner.until(lambda: statuses["bridge"].level == DiagnosticStatus.OK, 10.0)
