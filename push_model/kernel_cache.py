@@ -18,6 +18,9 @@ import numpy as np
 from numba.core import caching
 from numba.core.dispatcher import Dispatcher
 
+if not hasattr(caching, "InTreeCacheLocator"):
+    raise ImportError(f"numba 0.62 or later is needed, this is {numba.__version__}; update it")
+
 PACKAGES = (
     "benchmarks",
     "grasp_opt",
