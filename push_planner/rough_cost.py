@@ -225,6 +225,11 @@ def rough_costs(
             straight = math.sqrt(dx * dx + dy * dy)
             if cost + pace * straight >= min(arrived[j, s], bound - pace * remaining[j]):
                 continue
+            # Without the obstacles, which take far longer to look for.
+            a, b = robots[s, i], robots[s, j]
+            length = guessed_length(a[0], a[1], a[3], a[4], b[0], b[1], b[3], b[4], chords[s])
+            if cost + pace * length >= arrived[j, s]:
+                continue
             length = _guess(
                 i, j, s, robots, chords, grasps, window, sight, least, field, ox, oy, scale
             )
