@@ -8,8 +8,8 @@ semi-structured environments", 2010). The last piece, into the goal, is a push c
 of the rest is a lower bound: that of one run on this side, or that of a change of the side and of
 the way of the object's centre of mass. The search may also run backward from the goal.
 
-Collisions are looked for at the end of each arc only. ``arc_pushes.py`` makes push curves of the
-result, which are checked all along.
+Collisions are looked for in the middle and at the end of each arc only. ``arc_pushes.py`` makes
+push curves of the result, which are checked all along.
 """
 
 import math
@@ -22,13 +22,14 @@ from numpy.typing import NDArray
 
 from push_model import heap
 from push_model.arrays import Array
+from push_planner.arc_room import free, may_change, room_of
 from push_planner.least_way import way_at
 from push_planner.push_curve import BASIS_COARSE, BASIS_DENSE, solve_curve
-from push_planner.push_sweep import push_clearance, rooms_behind
+from push_planner.push_sweep import push_clearance
 from push_planner.rough_cost import guessed_length
-from push_planner.run_bounds import run_length, run_time, stands, wrapped
+from push_planner.run_bounds import run_length, run_time, wrapped
 from push_planner.run_ends import RunEnds
-from push_planner.scene import LEAVING, TURNING, PushScene
+from push_planner.scene import PushScene
 from push_planner.shortest_chord import shortest_chords
 
 _WIDTH, _ANGLES = 0.03, 96  # [m] of a cell, at least; cells in a turn
@@ -77,25 +78,6 @@ class _Costs(NamedTuple):
     least: float
 
 
-class _Room(NamedTuple):
-    """Outlines ``(n, 2)`` [m], radii [m], and ``(sides, 2)`` [m] from contact to where the robot
-    may turn; turning, keeps: [m] clearances there and on the way back. needed: [m] clearance of
-    all poses, leaving: [m] that of the first ones, up to ``first`` [s] of cost. map: distance
-    field."""
-
-    object_points: Any
-    robot_points: Any
-    object_radius: float
-    robot_radius: float
-    backs: Any
-    turning: float
-    keeps: float
-    needed: float
-    leaving: float
-    first: float
-    map: Any
-
-
 class _Tree(NamedTuple):
     """poses ``(n, 3)``, costs ``(n,)`` [s], parents ``(n,)``, sides ``(n,)`` of the nodes; a heap
     of them; ``(rows, columns, angles, sides)`` least costs of cells; x, y [m] of the first cell,
@@ -124,6 +106,14 @@ def _composed(pose: Any, x: float, y: float, angle: float) -> Any:
     result[0], result[1] = pose[0] + c * x - s * y, pose[1] + s * x + c * y
     result[2] = pose[2] + angle
     return result
+
+
+@numba.njit(cache=True)
+def _along_arc(pose: Any, length: float, turn: float) -> Any:
+    """``(3,)`` the pose after an arc of this length [m], which turns so far [rad]."""
+    half = 0.5 * turn
+    chord = length * math.sin(half) / half if turn != 0.0 else length
+    return _composed(pose, chord * math.cos(half), chord * math.sin(half), turn)
 
 
 @numba.njit(cache=True)
@@ -157,33 +147,6 @@ def _rest(pose: Any, robot: Any, side: int, target: Any, costs: Any) -> float:
         length = run_length(x, y, theta, robot[0], robot[1], robot[2], target.radii[side], 0.0, 0.0)
     length = max(length, way / target.fastest[side])
     return float(min(other, run_time(length, abs(wrapped(theta - robot[2])), costs.speeds)))
-
-
-@numba.njit(cache=True)
-def _free(pose: Any, robot: Any, needed: float, room: Any) -> bool:
-    """Whether object and robot keep ``needed`` [m] at a pose."""
-    field, ox, oy, scale = room.map
-    x, y, theta = robot
-    if not stands(room.robot_points, room.robot_radius, x, y, theta, needed, field, ox, oy, scale):
-        return False
-    x, y, theta = pose
-    return bool(
-        stands(room.object_points, room.object_radius, x, y, theta, needed, field, ox, oy, scale)
-    )
-
-
-@numba.njit(cache=True)
-def _may_change(robot: Any, side: int, room: Any) -> bool:
-    """Whether the robot can back off from a contact."""
-    field, ox, oy, scale = room.map
-    for back in room.backs[side]:
-        found = rooms_behind(
-            robot.reshape((1, 3)), back, room.turning, room.keeps, field, room.robot_points,
-            ox, oy, scale,
-        )  # fmt: skip
-        if found[0]:
-            return True
-    return False
 
 
 @numba.njit(cache=True)  # infinities: no fast mathematics
@@ -220,23 +183,27 @@ def _last_push(
 
 
 @numba.njit(cache=True)  # infinities: no fast mathematics
-def _offer(
-    pose: Any, robot: Any, side: int, cost: float, parent: int, needed: float,
-    tree: Any, target: Any, costs: Any, room: Any,
-) -> None:  # fmt: skip
-    """Add a node unless its cell has a cheaper one or something is in its way."""
+def _estimate(
+    pose: Any, robot: Any, side: int, cost: float, tree: Any, target: Any, costs: Any
+) -> float:
+    """Estimated cost [s] of plans through a node; infinite where none can be cheaper than those
+    that are known, or its cell has a cheaper node."""
     i, j, k = _cell(pose, tree)
     if i < 0 or cost >= tree.best[0] or tree.cells[i, j, k, side] <= cost:
-        return
-    if not _free(pose, robot, needed, room):
-        return
+        return math.inf
+    key = cost + _rest(pose, robot, side, target, costs)
+    return key if key < tree.best[0] else math.inf
+
+
+@numba.njit(cache=True)
+def _add(pose: Any, side: int, cost: float, key: float, parent: int, tree: Any) -> None:
+    """Add a node, the cheapest one of its cell."""
+    i, j, k = _cell(pose, tree)
     tree.cells[i, j, k, side] = cost
     n = tree.counts[0]
     tree.poses[n], tree.costs[n], tree.parents[n], tree.sides[n] = pose, cost, parent, side
     tree.counts[0] = n + 1
-    key = cost + _rest(pose, robot, side, target, costs)
-    if key < tree.best[0]:
-        tree.counts[1] = heap.push(tree.keys, tree.items, tree.counts[1], key, n)
+    tree.counts[1] = heap.push(tree.keys, tree.items, tree.counts[1], key, n)
 
 
 @numba.njit(cache=True)  # infinities: no fast mathematics
@@ -267,24 +234,31 @@ def _advance(
         low, high = sides.limits[side]
         for bend in bends:
             turn = step * target.direction * bend * (high if bend > 0.0 else -low)
-            chord = step * target.direction
-            if turn != 0.0:
-                chord *= math.sin(0.5 * turn) / (0.5 * turn)
-            ahead, aside = chord * math.cos(0.5 * turn), chord * math.sin(0.5 * turn)
-            after = _composed(robot, ahead, aside, turn)
+            after = _along_arc(robot, step * target.direction, turn)
             total = cost + run_time(step, abs(turn), costs.speeds)
             needed = room.needed if total > room.first else room.leaving
             reached = _placed(after, sides.grasps, side)
-            _offer(reached, after, side, total, n, needed, tree, target, costs, room)
+            key = _estimate(reached, after, side, total, tree, target, costs)
+            if key == math.inf or not free(reached, after, needed, room):
+                continue
+            halfway = _along_arc(robot, 0.5 * step * target.direction, 0.5 * turn)
+            if free(_placed(halfway, sides.grasps, side), halfway, needed, room):
+                _add(reached, side, total, key, n, tree)
         parent = tree.parents[n]
-        if parent < 0 or tree.sides[parent] != side or not _may_change(robot, side, room):
+        if parent < 0 or tree.sides[parent] != side:
             continue
+        may_back_off = False
         for other in range(len(sides.grasps)):
             total = cost + costs.changes[side, other] + costs.begin
-            if total < tree.best[0]:
-                after = _placed(pose, sides.contacts, other)
-                if _may_change(after, other, room):
-                    _offer(pose, after, other, total, n, room.needed, tree, target, costs, room)
+            after = _placed(pose, sides.contacts, other)
+            key = _estimate(pose, after, other, total, tree, target, costs)
+            if key == math.inf:
+                continue
+            may_back_off = may_back_off or may_change(robot, side, room)
+            if not may_back_off:
+                break
+            if may_change(after, other, room) and free(pose, after, room.needed, room):
+                _add(pose, other, total, key, n, tree)
     return False
 
 
@@ -309,7 +283,7 @@ class ArcSearch:
         backward: from the goal to the start. bound: [s] the plan must cost less. most: number of
         nodes at most.
         """
-        settings, time, sides = scene.settings, scene.time, scene.sides
+        time, sides = scene.time, scene.sides
         pose, self._target = (ends.goal, ends.start) if backward else (ends.start, ends.goal)
         self._backward = backward
         known = ends.radii, ends.fastest
@@ -323,16 +297,7 @@ class ArcSearch:
         chords = np.array([shortest_chords(*limit) for limit in limits])
         changes = time.changes.copy()
         np.fill_diagonal(changes, math.inf)
-        needed = settings.safety_distance
-        room = _Room(
-            *scene.bodies,
-            scene.robot.footprint_radius + TURNING * needed,
-            scene.robot_keeps(),
-            needed,
-            needed if backward else scene.leaving(pose),
-            time.begin + run_time(LEAVING, 0.0, time.speeds),
-            (scene.field.values, *scene.field.args),
-        )
+        room = room_of(scene, pose, backward)
         self._tree = self._planted(scene, pose, ends.arrives if backward else begins, bound, most)
         self._known = (
             target,

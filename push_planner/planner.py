@@ -189,21 +189,21 @@ class PushPlanner:
     def _improved(
         self, best: PushPlan, ends: _Ends, guides: Guides, run_ends: RunEnds, work: Work
     ) -> Generator[Progress, None, PushPlan]:
-        """Search below the cost of the best plan: along another guide path, over arcs, then near
-        its poses. Returns the best plan."""
+        """Search below the cost of the best plan: over arcs or, where that finds nothing, along
+        another guide path; then near its poses. Returns the best plan."""
         settings = self.settings
         start, goal = (self.scene.item.mass_pose(pose) for pose in ends)
         work.left = settings.improvement_expansions
         for number in range(settings.improvement_rounds):
             bound = (1.0 - _WORTH) * best.cost
-            if bound <= work.least:
+            if bound <= work.least or work.left <= 0:
                 break
-            if number == 1 and best.cost > (1.0 + _NEAR_BOUND) * work.least:
-                best = yield from self._over_arcs(best, ends[1], run_ends, work)
-                yield Progress("improving", best)
-                bound = (1.0 - _WORTH) * best.cost
-            if work.left <= 0:
-                break
+            if number == 0 and best.cost > (1.0 + _NEAR_BOUND) * work.least:
+                found = yield from self._over_arcs(best, ends[1], run_ends, work)
+                if found is not best:
+                    best = found
+                    yield Progress("improving", best)
+                    continue
             if number == 0:
                 count, most = settings.improvement_poses, settings.improvement_expansions // 2
                 graph = self._graph(start, goal, guides.all()[-1], 1, count, 0, work)

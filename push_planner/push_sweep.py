@@ -211,3 +211,33 @@ def rooms_behind(
             before = d if spare == 0 else -1.0
             k = min(steps, k + max(1, spare))
     return result
+
+
+@numba.njit(cache=True)
+def room_behind(
+    robot: Any,
+    back: float,
+    turning: float,
+    needed: float,
+    field: Any,
+    robot_points: Any,
+    robot_radius: float,
+    ox: float,
+    oy: float,
+    scale: float,
+) -> bool:
+    """``rooms_behind`` of one contact pose ``(3,)``, in far less time where there is much room.
+
+    robot_radius: [m] of the circle about the axle midpoint that contains the robot.
+    """
+    x, y, theta = robot
+    middle = 0.5 * back
+    around = lookup(
+        field, x - middle * math.cos(theta), y - middle * math.sin(theta), ox, oy, scale
+    )
+    if around >= middle + max(turning, robot_radius + needed):
+        return True
+    found = rooms_behind(
+        robot.reshape((1, 3)), back, turning, needed, field, robot_points, ox, oy, scale
+    )
+    return bool(found[0])

@@ -123,6 +123,50 @@ def test_its_pushes_join_start_and_goal_without_a_collision(planners, count):
     assert found > 0.6 * count and several > 0.4 * count
 
 
+def test_poses_are_kept_only_where_a_cheaper_plan_may_lead_through(planners):
+    kept = 0
+    for start, goal in problems(planners[0], 3, 5):
+        scene = planners[0].scene
+        ends = RunEnds.of(scene, start, goal)
+        bound = 1.05 * searched(scene, start, goal, False).cost
+        if bound == math.inf:
+            continue
+        search = searched(scene, start, goal, False, bound)
+        count = search._tree.counts[0]
+        poses, costs = search._tree.poses[:count], search._tree.costs[:count]
+        left = np.array([ends.left.at(pose) for pose in poses]) / ends.fastest.max()
+        rest = scene.time.pace * left
+        assert np.all(costs[1:] + rest[1:] < bound)
+        kept += int(count)
+    assert kept > 1000
+
+
+@pytest.mark.parametrize("backward", [True, False])
+def test_halfway_along_an_arc_nothing_is_in_the_way(planners, backward):
+    arcs = 0
+    for planner in planners:
+        scene, needed = planner.scene, planner.settings.safety_distance
+        for start, goal in problems(planner, 4, 5):
+            search = searched(scene, start, goal, backward)
+            if search.cost == math.inf:
+                continue
+            poses, sides = search.path()
+            # The first pose may be nearer to an obstacle, and the last piece is no arc.
+            inner = slice(4, -4)
+            for a, b, number in list(zip(poses, poses[1:], sides, strict=False))[inner]:
+                side = scene.sides[number]
+                x, y = side.robot_pose(a), side.robot_pose(b)
+                turn = se2.wrap(y[2] - x[2])
+                length = math.hypot(y[0] - x[0], y[1] - x[1]) / np.sinc(0.5 * turn / np.pi)
+                half = 0.5 * length * np.sinc(0.25 * turn / np.pi)
+                ahead = np.array([half * math.cos(turn / 4), half * math.sin(turn / 4), turn / 2])
+                middle = se2.compose(x, ahead)
+                assert scene.robot_clearance(middle) > needed - 1e-6
+                assert scene.object_clearance(se2.compose(middle, side.grasp)) > needed - 1e-6
+                arcs += 1
+    assert arcs > 50
+
+
 def test_equal_searches_give_equal_paths_and_few_nodes_end_it(planners):
     (start, goal), *_ = problems(planners[0], 1, 3)
     first, second = (searched(planners[0].scene, start, goal, False) for _ in range(2))
