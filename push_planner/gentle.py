@@ -20,9 +20,11 @@ from push_planner.push_graph import PushGraph, PushStep, SearchStatistics
 from push_planner.push_search import PushSearch
 from push_planner.scene import PushScene
 
-_SEARCHED = (0.5, 0.6, 0.7, 0.8, 0.9)  # of the trusted curvatures, in the search for other poses
+_SEARCHED = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+"""Parts of the trusted curvatures, in the search for other poses."""
 _TRIED = tuple(0.05 * k for k in range(4, 20))  # of them, for a single push
-_POSES, _SIZES = 40, (0.25, 0.15, 0.1, 0.05, 0.025)  # poses about each one, and how far away [m]
+_POSES = 80  # about each one
+_SIZES = (0.3, 0.2, 0.15, 0.1, 0.05, 0.025)  # [m] that they are away
 _SAMPLES = 321  # along a curve
 _FIRST = 0.1  # by which the first poses that are found may cost more
 
