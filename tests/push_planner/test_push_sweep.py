@@ -12,6 +12,8 @@ from push_model.shape_specs import PolygonShape, RectangleShape
 from push_model.shapes import densified
 from push_model.specs import BoxSpec, EnvironmentSpec
 from push_planner import DistanceField, PlannerSettings, PushCurve, PushScene, shortest_push_curve
+from push_planner.push_sweep import room_behind, rooms_behind
+from push_planner.scene import TURNING
 from tests.push_planner.exact_geometry import body_distance, placed, points_distance, random_world
 from tests.samples import mostly_long
 
@@ -144,3 +146,24 @@ def test_robots_that_have_room_behind_keep_the_distance_all_the_way(robot, box):
         has += found.sum()
         hasnt += (~found).sum()
     assert has > 150 and hasnt > 150
+
+
+def test_room_behind_is_that_of_the_robot_at_every_distance(scenario, robot, box):
+    scene = PushScene(DistanceField(scenario.grid), robot, box, PlannerSettings())
+    x0, x1, y0, y1 = scene.field.grid.extent
+    _, points, _, radius, backs = scene.bodies
+    turning = robot.footprint_radius + TURNING * scene.settings.safety_distance
+    keeps, known = scene.robot_keeps(), (scene.field.values, points)
+    poses = np.random.default_rng(6).uniform([x0, y0, -np.pi], [x1, y1, np.pi], (2000, 3))
+    free = 0
+    for pose in poses:
+        back = float(backs[0, 0])
+        found = room_behind(pose, back, turning, keeps, *known, radius, *scene.field.args)
+        slow = rooms_behind(pose[None], back, turning, keeps, *known, *scene.field.args)[0]
+        assert found or not slow
+        if found:
+            way = [se2.compose(pose, np.array([-b, 0.0, 0.0])) for b in np.linspace(0, back, 61)]
+            assert min(scene.robot_clearance(p) for p in way) >= keeps - 5e-4
+            assert scene.field.at(*way[-1][:2]) >= turning - 1e-9
+            free += 1
+    assert 300 < free < 1900
