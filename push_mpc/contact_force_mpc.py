@@ -33,8 +33,10 @@ PRINTED_GAINS: Mapping[str, Any] = {
     "input_weight": (0.1, 0.1),
     "force_weight": 0.001,
     "input_rate_weight": (0.1, 0.1),
+    "feedforward": False,
 }
-"""Q, P = 50 Q, R_u and R_du of section 2.4.6, which are of a Pioneer; ours are the defaults."""
+"""Q, P = 50 Q, R_u and R_du of section 2.4.6, which are of a Pioneer, in the cost (2.52) as
+printed; ours are the defaults."""
 
 FORCES = 4
 """f_1R, f_1L, f_2R, f_2L of (2.39)."""
@@ -98,7 +100,7 @@ class ContactForceMpc(LtvMpc):
         if len(circles) > s.max_obstacles:
             raise ValueError(f"{len(circles)} obstacles, at most {s.max_obstacles} have a row")
         twist = np.ascontiguousarray(reference.twist)
-        self._condense(error, twist)
+        self._condense(error, twist, self._forward(contact))
         tick_rows(
             twist,
             self._rollout,

@@ -10,14 +10,29 @@ from push_mpc.line_contact import LineContact
 
 
 @dataclass(frozen=True)
+class Held:
+    """A reference for commands that are held until the next one, which is sooner than a step of the
+    horizon.
+
+    last: [m/s], [rad/s] mean of v_d and omega_d since the last command. acceleration: [m/s^2],
+    [rad/s^2] from there to the mean until the next one.
+    """
+
+    last: tuple[float, float]
+    acceleration: tuple[float, float]
+
+
+@dataclass(frozen=True)
 class Reference:
     """The reference over the horizon.
 
     pose: ``(p + 1, 3)`` world frame; twist: ``(p + 1, 3)`` v_d, w_d, omega_d of that frame, in it.
+    held: v_d and omega_d about now, as commands can follow them; None: as in the first step.
     """
 
     pose: Array
     twist: Array
+    held: Held | None = None
 
 
 @dataclass(frozen=True)

@@ -84,7 +84,7 @@ class LtvMpc:
     def reset(self) -> None:
         """Forget the previous solution."""
         self._nominal = np.zeros((self.settings.horizon, 2))
-        self._previous = np.zeros(2)
+        self._previous, self._wanted = np.zeros(2), np.zeros(2)
         self._solver.reset()
 
     def solve(
@@ -101,6 +101,11 @@ class LtvMpc:
         total = error.sum() + reference.pose.sum() + reference.twist.sum() + circles.sum()
         if not math.isfinite(total):
             return self._failed("input is not finite", started)
+        held = reference.held if self._forward(contact) else None
+        if held is not None:
+            error = error.copy()
+            error[3] += reference.twist[0, 0] - held.last[0]
+            error[4] += reference.twist[0, 2] - held.last[1]
         result = self._solver.solve(self.programme(error, reference, contact, circles))
         if not result.solved:
             return self._failed(result.status, started)
@@ -119,10 +124,13 @@ class LtvMpc:
         # The tick is far shorter than a step: linearise about the same inputs next time.
         self._nominal = u.copy()
         self._previous = u[0].copy()
+        self._wanted = (reference.twist[1] - reference.twist[0])[[0, 2]] / self.settings.step
+        a, eps = u[0]
+        if held is not None:  # the next command is followed by another before the step ends
+            a += held.acceleration[0] - self._wanted[0]
+            eps += held.acceleration[1] - self._wanted[1]
         cpu = time.thread_time() - started
-        return MpcResult(
-            (float(u[0, 0]), float(u[0, 1])), True, max(float(part[worst]), 0.0), cpu, ""
-        )
+        return MpcResult((float(a), float(eps)), True, max(float(part[worst]), 0.0), cpu, "")
 
     def programme(
         self, error: Array, reference: Reference, contact: Contact | None, circles: Array
@@ -135,7 +143,7 @@ class LtvMpc:
         if len(circles) > s.max_obstacles:
             raise ValueError(f"{len(circles)} obstacles, at most {s.max_obstacles} have a row")
         twist = np.ascontiguousarray(reference.twist)
-        self._condense(error, twist)
+        self._condense(error, twist, self._forward(contact))
         limits = None if contact is None else contact.limits
         low, high = (0.0, 0.0) if limits is None else (limits.minimum, limits.maximum)
         tick_rows(
@@ -153,7 +161,15 @@ class LtvMpc:
         )
         return qp
 
-    def _condense(self, error: Array, twist: Array) -> None:
+    def _forward(self, contact: Contact | None) -> bool:
+        """Whether the accelerations of the reference are fed forward: not in a push.
+
+        A push whose brakes lag ends slowly, which leaves time to make good that poses are late by
+        more or less than is assumed.
+        """
+        return self.settings.feedforward and contact is None
+
+    def _condense(self, error: Array, twist: Array, forward: bool) -> None:
         """Cost and outputs of this step, about the previous solution: into the programme."""
         s, qp = self.settings, self._qp
         condense(
@@ -166,6 +182,8 @@ class LtvMpc:
             self._P,
             self._R,
             self._Rd,
+            forward,
+            self._wanted,
             qp.H,
             qp.f,
             qp.S,

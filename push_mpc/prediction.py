@@ -129,6 +129,8 @@ def condense(
     P: Any,
     R: Any,
     Rd: Any,
+    forward: bool,
+    wanted: Any,
     H: Any,
     f: Any,
     S: Any,
@@ -143,6 +145,9 @@ def condense(
     ----------
     e0: ``(5,)`` error now. nominal: ``(p, 2)`` inputs to linearise about. previous: ``(2,)`` input
     before. ref: ``(p + 1, 3)`` v_d, w_d, omega_d. Q, P: ``(5,)``; R, Rd: ``(2,)`` diagonals.
+    forward: whether R and Rd weigh the inputs less the accelerations of the reference, so that
+    following it costs nothing; otherwise the inputs, as printed. wanted: ``(2,)`` acceleration of
+    the reference at the previous input.
 
     Filled in: the part of H ``(n, n)`` and f ``(n,)`` that belongs to the inputs; the state part of
     S ``(p, 7, 2p)`` and of g ``(p, 7)`` such that e_{k+1} = g_k + S_k u, and the part of g that the
@@ -225,6 +230,13 @@ def condense(
             else:
                 f[c] -= 2.0 * Rd[i] * previous[i]
                 g[0, 5 + i] = -previous[i]
+            if forward:
+                j = 2 * i  # of v_d, omega_d
+                now = (ref[k + 1, j] - ref[k, j]) / h
+                change = now - (wanted[i] if k == 0 else (ref[k, j] - ref[k - 1, j]) / h)
+                f[c] -= 2.0 * R[i] * now + 2.0 * Rd[i] * change
+                if k > 0:
+                    f[c - 2] += 2.0 * Rd[i] * change
     for c in range(2 * p):
         for d in range(c):
             H[d, c] = H[c, d]

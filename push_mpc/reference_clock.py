@@ -6,12 +6,13 @@ import numpy as np
 
 from push_model.arrays import Array
 from push_model.trajectory import Trajectory
-from push_mpc.controller import Reference
+from push_mpc.controller import Held, Reference
 from push_mpc.settings import TrackerSettings
 
 # Of the nominal pace. A slower reference is stopped; otherwise it would approach lag_end for ever
 # in front of a robot that does not move.
 _HALTED = 0.02
+_SHORTEST = 1e-3  # [s] over which an acceleration is told
 
 
 class ReferenceClock:
@@ -26,6 +27,7 @@ class ReferenceClock:
         self.time = 0.0
         self.halted = 0.0
         self._rate = 0.0
+        self._passed = 0.0  # [s] of the trajectory, since the last command
 
     @property
     def ended(self) -> bool:
@@ -42,16 +44,23 @@ class ReferenceClock:
         s = self._settings
         self._rate = min(1.0, max(0.0, (s.lag_end - lag) / (s.lag_end - s.lag_begin)))
         self.halted = self.halted + dt if self._rate < _HALTED and not self.ended else 0.0
-        self.time = min(self.time + self._rate * dt, self.trajectory.duration)
+        before = self.time
+        self.time = min(before + self._rate * dt, self.trajectory.duration)
+        self._passed = self.time - before
 
-    def reference(self, horizon: int, step: float, shift: Array) -> Reference:
+    def reference(self, horizon: int, step: float, shift: Array, dt: float) -> Reference:
         """The reference from now on, at the present pace, in frames moved by shift ``(3,)``.
 
-        shift: pose of the wanted robot frame in the trajectory's frame; its twist is that of a
-        frame fixed to the trajectory's, so that it slides sideways when it sits ahead in a bend.
+        dt: [s] between two commands. shift: pose of the wanted robot frame in the trajectory's
+        frame; its twist is that of a frame fixed to the trajectory's, so that it slides sideways
+        when it sits ahead in a bend.
         """
         rate = self._rate
-        pose, twist = self.trajectory.sample(self.time + rate * step * np.arange(horizon + 1))
+        dt = max(dt, _SHORTEST)
+        times = self.time + rate * step * np.arange(horizon + 3)
+        # A command is held: the means are the velocities in the middle.
+        times[-2:] = self.time - 0.5 * self._passed, self.time + 0.5 * rate * dt
+        pose, twist = self.trajectory.sample(times)
         v, omega = rate * twist[:, 0], rate * twist[:, 1]
         c, sn = np.cos(pose[:, 2]), np.sin(pose[:, 2])
         moved = pose.copy()
@@ -61,4 +70,6 @@ class ReferenceClock:
         ahead, across = v - omega * shift[1], omega * shift[0]
         ct, st = math.cos(shift[2]), math.sin(shift[2])
         body = np.column_stack([ct * ahead + st * across, -st * ahead + ct * across, omega])
-        return Reference(moved, body)
+        ahead, _, turning = (body[-1] - body[-2]) / dt
+        held = Held((float(body[-2, 0]), float(body[-2, 2])), (float(ahead), float(turning)))
+        return Reference(moved[:-2], body[:-2], held)

@@ -53,11 +53,18 @@ class MpcSettings:
         doc="Diagonal of the weight matrix R_du of the MPC: weights of the squared changes per "
         "step of the linear and the angular acceleration (in m/s^2, rad/s^2)",
     )
+    feedforward: bool = bounded(
+        True,
+        doc="Whether the MPC, when the robot moves alone, applies input_weight and "
+        "input_rate_weight to the accelerations less those of the reference. The robot then "
+        "follows a reference that speeds up or brakes without delay. Otherwise, and in a push, "
+        "they apply to the accelerations, as in (2.52)",
+    )
     max_acceleration: float = bounded(
         0.5, low=0.01, high=20.0, doc="Limit of the linear acceleration (m/s^2)"
     )
     max_turn_acceleration: float = bounded(
-        12.0, low=0.01, high=200.0, doc="Limit of the angular acceleration (rad/s^2)"
+        18.0, low=0.01, high=200.0, doc="Limit of the angular acceleration (rad/s^2)"
     )
     max_acceleration_change: float = bounded(
         0.5,
@@ -66,7 +73,7 @@ class MpcSettings:
         doc="Limit of the change of the linear acceleration in one step (m/s^2)",
     )
     max_turn_acceleration_change: float = bounded(
-        12.0,
+        18.0,
         low=0.001,
         high=500.0,
         doc="Limit of the change of the angular acceleration in one step (rad/s^2)",

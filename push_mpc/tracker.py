@@ -159,6 +159,7 @@ class TrajectoryTracker:
             self.controller.horizon,
             self.controller.step,
             np.zeros(3) if grasp is None or self.settings.tracked == "robot" else grasp.shift,
+            dt,
         )
         error = self._error(robot, reference)
         self._lag = -float(error[0])

@@ -183,12 +183,15 @@ class _Motion:
         self._parts: list[Trajectory] = []
         self._pose = np.array(start)
         self._drive, self._settings = drive, settings
+        # The wheels of a wide robot speed up no more in a turn than on a straight line.
+        widest = settings.move_acceleration / drive.half_track
+        self._turning = min(settings.turn_acceleration, widest)  # [rad/s^2]
 
     def _turn(self, heading: float) -> None:
         s, angle = self._settings, se2.wrap(heading - float(self._pose[2]))
         rate = min(s.turn_rate, (1.0 - s.wheel_reserve) * self._drive.max_turn_rate)
         if abs(angle) > _STILL:
-            self._parts.append(rotation(self._pose, angle, rate, s.turn_acceleration))
+            self._parts.append(rotation(self._pose, angle, rate, self._turning))
         self._pose = self._pose + np.array([0.0, 0.0, angle])
 
     def along(self, points: Array, direction: Array, curvature: Array, astern: bool) -> None:
@@ -203,7 +206,7 @@ class _Motion:
             s.move_speed,
             s.move_acceleration,
             s.wheel_reserve,
-            s.turn_acceleration,
+            self._turning,
         )
         pose = ahead.pose + np.array([0.0, 0.0, float(self._pose[2]) - ahead.pose[0, 2]])
         twist = ahead.twist * np.array([-1.0 if astern else 1.0, 1.0])
@@ -215,5 +218,5 @@ class _Motion:
         self._turn(float(goal[2]))
         if not self._parts:
             s = self._settings
-            self._parts.append(rotation(self._pose, 1e-4, s.turn_rate, s.turn_acceleration))
+            self._parts.append(rotation(self._pose, 1e-4, s.turn_rate, self._turning))
         return concatenate(self._parts)

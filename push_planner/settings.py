@@ -191,10 +191,11 @@ class PlannerSettings:
         doc="Greatest turn rate of the robot when it turns in place between two pushes (rad/s)",
     )
     turn_acceleration: float = bounded(
-        7.0,
+        12.0,
         low=0.05,
         high=50.0,
-        doc="Angular acceleration of the robot when it turns in place between two pushes (rad/s^2)",
+        doc="Greatest angular acceleration of the robot between two pushes (rad/s^2). A wide robot "
+        "turns more slowly: no wheel accelerates by more than move_acceleration",
     )
     improvement_rounds: int = bounded(
         20, low=0, high=50, doc="Maximum number of searches after the first plan, to lower its cost"

@@ -112,7 +112,7 @@ def test_a_robot_deep_inside_a_circle_is_not_solved_at_the_default_settings(seed
     ("kind", "limits", "circles", "error"),
     [
         ("wheel speed", None, NONE, [0.0, 0.0, 0.0, 0.2, 0.0]),
-        ("stable curvature", Contact(CurvatureLimits(-1.0, 1.0)), NONE, [0.0, 0.0, 0.0, 0.0, 1.5]),
+        ("stable curvature", Contact(CurvatureLimits(-1.0, 1.0)), NONE, [0.0, 0.0, 0.0, 0.0, 2.5]),
         ("obstacle", None, np.array([[0.05, 0.0, 0.08]]), [0.0] * 5),
     ],
 )

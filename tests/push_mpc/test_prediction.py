@@ -31,14 +31,17 @@ def test_discretisation_is_the_matrix_exponential(theta, v, omega, h):
     assert pytest.approx(exact[:5, 5:], abs=1e-9) == B
 
 
-def build(e0, nominal, ref, h=0.1, Q=None):
+BEFORE = np.array([0.2, 0.5])  # [m/s^2], [rad/s^2] of the reference, at the previous input
+
+
+def build(e0, nominal, ref, h=0.1, Q=None, forward=False):
     p = len(nominal)
     n = 2 * p + SLACKS
     H, f = np.zeros((n, n)), np.zeros(n)
     S, g, roll = np.zeros((p, OUTPUTS, 2 * p)), np.zeros((p, OUTPUTS)), np.zeros((p + 1, 5))
     Q = np.ones(5) if Q is None else Q
     before, R, Rd = np.array([0.1, -0.2]), np.array([0.3, 0.2]), np.array([0.1, 0.4])
-    condense(e0, nominal, before, ref, h, Q, 3 * Q, R, Rd, H, f, S, g, roll)
+    condense(e0, nominal, before, ref, h, Q, 3 * Q, R, Rd, forward, BEFORE, H, f, S, g, roll)
     return H, f, S[:, :5], g[:, :5], roll
 
 
@@ -87,24 +90,28 @@ def test_rollout_is_the_nonlinear_error_dynamics(seed):
         assert roll[k + 1] == pytest.approx(expected, abs=2e-5)
 
 
-def test_condensed_cost_is_2_52():
+@pytest.mark.parametrize("forward", [False, True])
+def test_condensed_cost_is_2_52(forward):
+    """As printed, or with the inputs less the accelerations of the reference."""
     random = np.random.default_rng(2)
-    p = 6
+    p, h = 6, 0.1
     nominal = random.normal(size=(p, 2)) * 0.1
-    ref = np.column_stack([np.full(p + 1, 0.08), np.zeros(p + 1), np.full(p + 1, 0.3)])
+    ref = np.column_stack([random.uniform(0.0, 0.1, p + 1), np.zeros(p + 1), np.ones(p + 1)])
+    ref[:, 2] *= random.uniform(-0.5, 0.5, p + 1)
+    wanted = np.diff(ref[:, [0, 2]], axis=0) / h if forward else np.zeros((p, 2))
     Q = np.array([4.0, 3.0, 2.0, 1.0, 0.5])
     e0 = np.array([0.01, -0.02, 0.1, 0.0, 0.1])
-    H, f, S, g, _ = build(e0, nominal, ref, Q=Q)
+    H, f, S, g, _ = build(e0, nominal, ref, h, Q, forward)
 
     def cost(u):
         flat = u.ravel()
         total = 0.0
-        before = np.array([0.1, -0.2])
+        before = np.array([0.1, -0.2]) - (BEFORE if forward else 0.0)
         for k in range(p):
-            e = g[k] + S[k] @ flat
+            e, a = g[k] + S[k] @ flat, u[k] - wanted[k]
             total += (3.0 if k == p - 1 else 1.0) * e @ (Q * e)
-            total += u[k] @ ([0.3, 0.2] * u[k]) + (u[k] - before) @ ([0.1, 0.4] * (u[k] - before))
-            before = u[k]
+            total += a @ ([0.3, 0.2] * a) + (a - before) @ ([0.1, 0.4] * (a - before))
+            before = a
         return total
 
     zero = cost(np.zeros((p, 2)))

@@ -56,8 +56,23 @@ def test_random_ways_are_driven_within_all_limits_and_never_slower_than_with_sto
         way = checked(driven(corners, start, goal), start, goal)
         stops = checked(driven(corners, start, goal, narrow), start, goal)
         assert way.duration <= stops.duration + 1e-9
-        faster += way.duration < 0.9 * stops.duration
+        # A robot that turns less briskly than is the default gains more.
+        slow, slow_stops = (
+            driven(corners, start, goal, keeps, turn_acceleration=7.0) for keeps in (free, narrow)
+        )
+        faster += slow.duration < 0.9 * slow_stops.duration
     assert faster > 75
+
+
+def test_wheels_of_a_wide_robot_speed_up_no_more_in_a_turn_than_on_a_line():
+    wide = DifferentialDrive(0.0975, 0.165, 6.28)
+    random = np.random.default_rng(4)
+    for _ in range(50):
+        start, goal = [0.0, 0.0, 0.0], [0.0, 0.0, random.uniform(0.2, 3.1)]
+        corners = np.array([start[:2], goal[:2]])
+        way = fastest_drive(corners, np.array(start), np.array(goal), free, wide, SETTINGS)
+        rise = np.abs(np.diff(way.twist[:, 1]) / np.diff(way.time)).max()
+        assert rise * wide.half_track <= SETTINGS.move_acceleration + 1e-6
 
 
 def test_a_corner_is_rounded_on_its_outer_side_without_a_stop():
