@@ -114,7 +114,8 @@ def _conclude(results: "dict[str, JobResult]", out: Path) -> int:
         good &= result.success  # within the tolerances of the system
         name = f"{result.team}: " if result.team else ""
         if math.isfinite(position):
-            print(f"{name}final error: {1e3 * position:.1f} mm, {orientation:.3f} rad")
+            true = "by the true poses; the job ends by the measured ones"
+            print(f"{name}final error: {1e3 * position:.1f} mm, {orientation:.3f} rad ({true})")
     for file in (*PRODUCTS, "bag"):
         print(f"  {out / file}")
     return 0 if good else 1

@@ -12,6 +12,7 @@ from pathlib import Path
 from planar_push.arguments import hear_signals
 from push_bringup.failures import DomainInUse, SuiteFailed
 from push_model.settings import SettingsError
+from push_ros.claims import DOMAINS, runs_in_lockstep
 from push_ros.process import prepare_environment
 
 NOT_VERBS = ("main", "arguments", "entry", "__main__")
@@ -44,6 +45,8 @@ def main(words: Sequence[str] | None = None) -> int:
     prepare_environment()
     arguments = parser().parse_args(words)
     try:
+        if hasattr(arguments, "namespace"):
+            _keep_out_of_studies()
         return int(arguments.run(arguments))
     except (SettingsError, FileExistsError, FileNotFoundError, DomainInUse) as error:
         print(f"error: {error}", file=sys.stderr)
@@ -51,6 +54,19 @@ def main(words: Sequence[str] | None = None) -> int:
     except SuiteFailed as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
+
+
+def _keep_out_of_studies() -> None:
+    """Raise DomainInUse where a command for a suite would reach a run in lockstep of another
+    process."""
+    domain = os.environ.get("ROS_DOMAIN_ID") or "0"
+    if runs_in_lockstep(domain):
+        first, last = DOMAINS
+        raise DomainInUse(
+            f"another process uses ROS domain {domain} now, for a study or another run in lockstep "
+            f"(these use the domains {first} to {last} in turn); set ROS_DOMAIN_ID to 0, or to "
+            f"{last + 1}"
+        )
 
 
 def command() -> None:

@@ -14,6 +14,9 @@ from pathlib import Path
 from typing import IO
 
 _PREFIX = "planar_push_"
+_MINE = "PLANAR_PUSH_DOMAIN"  # environment: the domain that this process or its parent has claimed
+DOMAINS = 1, 100
+"""First and last domain of runs in lockstep."""
 _claims: dict[int, IO[str]] = {}
 _turns = itertools.count()
 
@@ -66,16 +69,33 @@ def _has_world(domain: int) -> bool:
     return False
 
 
+def runs_in_lockstep(domain: str) -> bool:
+    """Whether somebody else on this machine has claimed a domain: what is sent there goes to that
+    run, for example to a trial of a study."""
+    if os.environ.get(_MINE) == domain:
+        return False
+    claim = _locked(f"domain_{domain}")
+    if claim is None:
+        return True
+    claim.close()
+    return False
+
+
 def claim_domain() -> int:
     """Set ROS_DOMAIN_ID to one that no other run on this machine has claimed, and in which no suite
-    runs; returns it.
+    runs; returns it. It is not that of the caller's environment, where a suite may run later.
 
     The claim is a locked file, held until it is released or this process ends. Two lockstep runs on
     one domain would answer each other's frames. A domain that was released is not taken again at
     once: those who were killed in it are remembered there for a while.
     """
-    for _ in range(100):
-        domain = 1 + (os.getpid() + next(_turns)) % 100
+    first, last = DOMAINS
+    count = last - first + 1
+    theirs = os.environ.get("ROS_DOMAIN_ID")
+    for _ in range(count):
+        domain = first + (os.getpid() + next(_turns)) % count
+        if str(domain) == theirs:
+            continue
         file = _locked(f"domain_{domain}")
         if file is None:
             continue
@@ -83,7 +103,7 @@ def claim_domain() -> int:
             file.close()
             continue
         _claims[domain] = file
-        os.environ["ROS_DOMAIN_ID"] = str(domain)
+        os.environ["ROS_DOMAIN_ID"] = os.environ[_MINE] = str(domain)
         return domain
     raise RuntimeError(
         "all hundred ROS domains for lockstep runs are in use; wait until another run has ended"
@@ -98,13 +118,15 @@ def release_domain(domain: int) -> None:
 @contextlib.contextmanager
 def own_domain() -> Iterator[int]:
     """A domain that nobody else on this machine has, while the block runs."""
-    before = os.environ.get("ROS_DOMAIN_ID")
+    names = "ROS_DOMAIN_ID", _MINE
+    before = {name: os.environ.get(name) for name in names}
     domain = claim_domain()
     try:
         yield domain
     finally:
         release_domain(domain)
-        if before is None:
-            os.environ.pop("ROS_DOMAIN_ID", None)
-        else:
-            os.environ["ROS_DOMAIN_ID"] = before
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value

@@ -196,3 +196,12 @@ def test_a_belief_on_the_command_line(text, expected):
             parsed(text)
     else:
         assert parsed(text) == (expected[0], Interval(*expected[1]))
+
+
+@pytest.mark.parametrize("words", [["goal", "0", "0", "0"], ["launch", "single"], ["view"]])
+def test_a_command_keeps_out_of_a_run_of_somebody_else(words, domain, monkeypatch, capsys):
+    """A goal was executed by the trial of a study that happened to run in the same domain."""
+    monkeypatch.delenv("PLANAR_PUSH_DOMAIN")  # as a process that this test has not started
+    assert main(words) == 2
+    error = capsys.readouterr().err
+    assert f"another process uses ROS domain {domain} now" in error and "ROS_DOMAIN_ID" in error

@@ -19,7 +19,7 @@ from std_msgs.msg import String
 from push_msgs.action import MoveObject
 from push_msgs.msg import JobState
 from push_ros import process
-from push_ros.claims import claim_world, own_domain, world_is_claimed
+from push_ros.claims import claim_world, own_domain, runs_in_lockstep, world_is_claimed
 from push_ros.latched import has_publisher, hear_latched
 from push_ros.process import INTERRUPTS, Spinner, heard, run_node
 from push_ros.qos import COMMAND, LATCHED
@@ -134,6 +134,29 @@ def test_a_domain_is_given_back(domain, monkeypatch):
     with own_domain():
         pass
     assert "ROS_DOMAIN_ID" not in os.environ
+
+
+def test_a_run_does_not_take_the_domain_of_its_caller(monkeypatch):
+    for number in range(1, 101):
+        monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
+        with own_domain() as own:
+            assert own != number
+
+
+def test_others_are_kept_out_of_the_domain_of_a_run(domain):
+    """A process that the run starts belongs to it; one from elsewhere does not."""
+    ask = "import sys; from push_ros.claims import runs_in_lockstep as r; print(r(sys.argv[1]))"
+    with own_domain() as own:
+        for environment, kept_out in (
+            (dict(os.environ), "False"),
+            ({k: v for k, v in os.environ.items() if not k.startswith("PLANAR_PUSH")}, "True"),
+        ):
+            words = [sys.executable, "-c", ask, str(own)]
+            told = subprocess.run(words, env=environment, capture_output=True, text=True)
+            assert told.stdout.strip() == kept_out, told.stderr
+        assert runs_in_lockstep(str(domain))  # that of this test, which the inner run has not made
+    assert not runs_in_lockstep(str(domain))
+    assert not runs_in_lockstep("0")
 
 
 def test_a_domain_of_its_own_is_none_in_which_a_suite_runs(domain, tmp_path, monkeypatch):
