@@ -15,6 +15,7 @@ from typing import IO
 
 _PREFIX = "planar_push_"
 _MINE = "PLANAR_PUSH_DOMAIN"  # environment: the domain that this process or its parent has claimed
+_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 DOMAINS = 1, 100
 """First and last domain of runs in lockstep."""
 _claims: dict[int, IO[str]] = {}
@@ -85,6 +86,9 @@ def claim_domain() -> int:
     """Set ROS_DOMAIN_ID to one that no other run on this machine has claimed, and in which no suite
     runs; returns it. It is not that of the caller's environment, where a suite may run later.
 
+    Other machines are shut out, whatever ROS_AUTOMATIC_DISCOVERY_RANGE says: nobody knows what runs
+    there in the domain, and the robots of a lab would obey the run.
+
     The claim is a locked file, held until it is released or this process ends. Two lockstep runs on
     one domain would answer each other's frames. A domain that was released is not taken again at
     once: those who were killed in it are remembered there for a while.
@@ -104,6 +108,7 @@ def claim_domain() -> int:
             continue
         _claims[domain] = file
         os.environ["ROS_DOMAIN_ID"] = os.environ[_MINE] = str(domain)
+        os.environ[_RANGE] = "LOCALHOST"
         return domain
     raise RuntimeError(
         "all hundred ROS domains for lockstep runs are in use; wait until another run has ended"
@@ -118,7 +123,7 @@ def release_domain(domain: int) -> None:
 @contextlib.contextmanager
 def own_domain() -> Iterator[int]:
     """A domain that nobody else on this machine has, while the block runs."""
-    names = "ROS_DOMAIN_ID", _MINE
+    names = "ROS_DOMAIN_ID", _MINE, _RANGE
     before = {name: os.environ.get(name) for name in names}
     domain = claim_domain()
     try:

@@ -143,6 +143,15 @@ def test_a_run_does_not_take_the_domain_of_its_caller(monkeypatch):
             assert own != number
 
 
+def test_a_run_is_heard_on_this_machine_only(domain, monkeypatch):
+    """A lab on another machine may have the domain of a trial: its robots would obey the trial."""
+    name = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+    monkeypatch.setenv(name, "SUBNET")
+    with own_domain():
+        assert os.environ[name] == "LOCALHOST"
+    assert os.environ[name] == "SUBNET"
+
+
 def test_others_are_kept_out_of_the_domain_of_a_run(domain):
     """A process that the run starts belongs to it; one from elsewhere does not."""
     ask = "import sys; from push_ros.claims import runs_in_lockstep as r; print(r(sys.argv[1]))"
