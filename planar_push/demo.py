@@ -27,6 +27,13 @@ if TYPE_CHECKING:
     from push_scenario.scenario import Scenario
 
 
+_OTHERS = {
+    "rearrange": "start it with 'planar-push launch rearrange', then run 'planar-push rearrange'",
+    "torque": "start it with 'planar-push launch torque', and send a trajectory (docs/torque.md)",
+}
+"""Systems that take no single goal of an object, and what to do instead."""
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this verb."""
     add_system_and_scenario(parser)
@@ -51,6 +58,10 @@ def run(arguments: argparse.Namespace) -> int:
     from push_scenario.scenario import load_scenario
     from push_view.report import PRODUCTS
 
+    if arguments.system in _OTHERS:
+        raise SettingsError(
+            f"demo does not run the system '{arguments.system}'; {_OTHERS[arguments.system]}"
+        )
     out = Path(arguments.out)
     scenario = load_scenario(scenario_of(arguments))
     if arguments.seed is not None:

@@ -129,7 +129,7 @@ def _graph(
     if sources > 1:
         text = f"{sources} bridges publish on {here}poses"
         found.append(error("TWO_BRIDGES", text, "stop one, or give it another --namespace"))
-    elif not states and arguments.part == "all":
+    elif not states and arguments.part == "all" and not arguments.drive:  # it needs the robots
         text = f"no node of a suite is in namespace {here}"
         found.append(warning("NO_SUITE", text, "planar-push launch starts one"))
     if paused and paused[-1]:

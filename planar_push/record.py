@@ -27,7 +27,10 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.scenario:
         scenario = load_scenario(arguments.scenario)
     else:
+        print("waiting for the scenario of a suite", flush=True)
         scenario = heard_scenario(arguments.namespace)
+
+    print(f"recording to {arguments.out} until Ctrl-C", flush=True)
 
     def make() -> RecorderNode:
         return RecorderNode(

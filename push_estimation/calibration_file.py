@@ -10,6 +10,7 @@ from push_estimation.calibration_runs import Calibration
 from push_model import se2
 from push_model.arrays import Array
 from push_model.belief import QUANTITIES, BeliefError, Interval
+from push_model.unique_keys import UniqueKeysLoader
 
 _HEAD = """# Written by planar-push calibrate.
 # values: planar-push belief --from THIS_FILE tells them to a running suite.
@@ -51,7 +52,7 @@ def read_values(path: Path) -> tuple[str, dict[tuple[str, str], Interval]]:
     BeliefError: it cannot be read, or a value is none.
     """
     try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
+        data = yaml.load(path.read_text(encoding="utf-8"), Loader=UniqueKeysLoader)
         found = {}
         for name, numbers in data["values"].items():
             body, _, quantity = str(name).rpartition(".")

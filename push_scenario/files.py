@@ -8,8 +8,8 @@ from typing import Any
 import yaml
 
 from push_model.settings import SettingsError
+from push_model.unique_keys import UniqueKeysLoader
 
-_Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _Dumper: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 
 
@@ -30,7 +30,7 @@ def config_directory() -> Path:
 def parse_yaml(text: str, where: str) -> Any:
     """The contents of YAML text; errors name where it is from."""
     try:
-        return yaml.load(text, Loader=_Loader)
+        return yaml.load(text, Loader=UniqueKeysLoader)  # a safe one
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise SettingsError(f"{where}: not valid YAML: {error}") from None
 

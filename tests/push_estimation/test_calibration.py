@@ -214,6 +214,7 @@ def test_the_file_of_a_calibration(tmp_path):
         "values: {box.mu: {value: 1, low: 1, high: 1}}",
         "values: {box.mass: {value: 1, low: 2, high: 3}}",
         "values: {box.mass: 1}",
+        "source: a\nsource: b\nvalues: {}",
     ],
 )
 def test_other_files_are_refused(tmp_path, text):

@@ -13,6 +13,7 @@ from push_model import SettingsError, from_mapping
 from push_model.bumpers import RingBumper
 from push_model.occupancy import rasterise
 from push_model.specs import ObjectSpec, RobotSpec
+from push_scenario.files import parse_yaml
 from push_scenario.scenario import (
     config_directory,
     load_scenario,
@@ -119,6 +120,26 @@ def test_malformed_yaml_names_the_file(tmp_path):
         load_scenario(str(path))
     with pytest.raises(SettingsError, match="cannot be read"):
         load_scenario(str(tmp_path / "none.yaml"))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "supervisor: {auto_execute: false}\n  supervisor: {position_tolerance: 0.005}",
+        "supervisor: {auto_execute: false, auto_execute: true}",
+    ],
+)
+def test_a_key_that_occurs_twice_is_refused(tmp_path, text):
+    """The last one won without a word: a robot drove although auto_execute was set to false."""
+    path = tmp_path / "twice.yaml"
+    path.write_text(yaml.safe_dump(GOOD) + f"parameters:\n  {text}\n")
+    with pytest.raises(SettingsError, match=r"twice\.yaml.*occurs twice in one mapping(?s:.*)line"):
+        load_scenario(str(path))
+
+
+def test_merged_keys_may_be_replaced():
+    values = parse_yaml("a: &a {x: 1, y: 2}\nb: {<<: *a, y: 3}\nc: {<<: [*a, {z: 4}]}", "here")
+    assert values["b"] == {"x": 1, "y": 3} and values["c"] == {"x": 1, "y": 2, "z": 4}
 
 
 def test_overrides_within_a_scenario():
