@@ -264,6 +264,7 @@ def _states(first: BagContents, second: BagContents) -> tuple[StateTimes, ...]:
     """States of all jobs, aligned by their names."""
     found: list[StateTimes] = []
     for key, job in first.jobs.items():
+        team = f"{key.strip('/')}: " if key.strip("/") else ""
         other = second.jobs.get(key)
         ours, theirs = _changes(job), _changes(other) if other is not None else []
         match = SequenceMatcher(None, [s.name for s in ours], [s.name for s in theirs])
@@ -273,5 +274,5 @@ def _states(first: BagContents, second: BagContents) -> tuple[StateTimes, ...]:
                 two = theirs[b0 + k] if b0 + k < b1 else None
                 name = (one or two or ours[0]).name
                 times = [None if s is None else s.time for s in (one, two)]
-                found.append((f"{key}{name}", times[0], times[1]))
+                found.append((f"{team}{name}", times[0], times[1]))
     return tuple(found)

@@ -198,6 +198,12 @@ def test_a_belief_on_the_command_line(text, expected):
         assert parsed(text) == (expected[0], Interval(*expected[1]))
 
 
+@pytest.mark.parametrize("system", ["rearrange", "torque"])
+def test_a_demo_of_a_system_without_a_single_goal_says_what_to_run(system, capsys):
+    assert main(["demo", system]) == 2
+    assert f"planar-push launch {system}" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("words", [["goal", "0", "0", "0"], ["launch", "single"], ["view"]])
 def test_a_command_keeps_out_of_a_run_of_somebody_else(words, domain, monkeypatch, capsys):
     """A goal was executed by the trial of a study that happened to run in the same domain."""

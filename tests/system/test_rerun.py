@@ -250,7 +250,7 @@ def test_a_live_bag_is_compared_by_distance(tmp_path, capsys):
     assert "the bag is of live use" in told and "equal to the bit" not in told
     (box,) = [line.split() for line in told.splitlines() if line.startswith("  box ")]
     assert float(box[5]) < 5.0  # [mm] at the end: both have reached the goal
-    assert "/PUSHING" in told
+    assert "  PUSHING" in told
 
 
 @pytest.mark.long
