@@ -107,7 +107,9 @@ class PushEstimates:
 
         The value is the median where the interval is at most a third as wide as the prior's. Else
         little is known, and it is the value of the object's file, or the end of the interval that
-        is nearest to it. The latency is left out until its interval is that narrow.
+        is nearest to it; but no friction that is more likely to be lower than not, since a plan
+        that trusts in too much friction slips. The latency is left out until its interval is that
+        narrow.
         """
         item, priors, found = self._item, self.priors(), dict[str, Interval]()
         files: Mapping[str, float] = {
@@ -119,7 +121,10 @@ class PushEstimates:
             if i.width <= _NARROW * priors[name].width:
                 found[name] = i
             elif name in files:
-                found[name] = Interval(min(max(files[name], i.low), i.high), i.low, i.high)
+                value = min(max(files[name], i.low), i.high)
+                if name == "contact_friction":
+                    value = min(value, i.value)
+                found[name] = Interval(value, i.low, i.high)
         return found
 
     def _note(self, time: float, names: tuple[str, ...], widened: bool, sentence: str) -> None:

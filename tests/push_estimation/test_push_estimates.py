@@ -7,6 +7,7 @@ from push_estimation.line_push_model import Bumper
 from push_estimation.push_estimates import PushEstimates
 from push_estimation.push_windows import PushWindows
 from push_model import se2
+from push_model.belief import Interval
 from push_scenario.bodies import load_object, load_robot
 from tests.push_estimation.weaving import HARD, NAMES, PRIOR, RATE, weave
 
@@ -138,6 +139,25 @@ def test_little_knowledge_leaves_the_value_of_the_file():
     known = weave(3).estimates
     narrow = known.believed()["contact_friction"]
     assert narrow == known.intervals()["contact_friction"]
+
+
+@pytest.mark.parametrize(
+    ("interval", "value"),
+    [
+        ((0.13, 0.077, 0.285), 0.13),  # likely to be lower than the 0.2 of the file
+        ((0.30, 0.077, 0.50), 0.2),  # not likely
+        ((0.40, 0.25, 0.60), 0.25),  # higher for sure: no more than that
+        ((0.33, 0.05, 0.66), 0.2),  # about the prior
+    ],
+)
+def test_a_friction_that_is_likely_to_be_lower_is_not_trusted(interval, value, monkeypatch):
+    """A box slid off the bumper four times: its friction was 0.08, and the interval, 0.077 to 0.28,
+    contained the 0.2 of its file."""
+    estimates = PushEstimates(EPUCK, BOX, PRIOR)
+    others = estimates.push.intervals()[1:]
+    monkeypatch.setattr(estimates.push, "intervals", lambda: (Interval(*interval), *others))
+    told = estimates.believed()["contact_friction"]
+    assert told == Interval(value, *interval[1:])
 
 
 def test_a_ring_bumper_has_no_line_contact():
