@@ -24,6 +24,7 @@ class TaskOutputs:
     ) -> None:
         self._intake, self._servers, self._errors, self._log = intake, servers, errors, log
         self._told: Status | None = None
+        self._said = ""
 
     def tell(self, status: Status, stamp: float, robots: Sequence[str]) -> None:
         """Tell a status, if it is new, at a time [s] of the poses; and that the task has ended."""
@@ -43,7 +44,10 @@ class TaskOutputs:
             step_count=int(status.count),
             replans=int(status.replans),
         )
-        self._log(f"{status.name}: {status.reason}")
+        said = f"{status.name}: {status.reason}"
+        if said != self._said:  # and not again for progress alone
+            self._said = said
+            self._log(said)
         if status.phase != JobPhase.IDLE:
             self._feedback(status)
         elif before is not None and before.phase != JobPhase.IDLE:
