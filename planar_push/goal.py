@@ -31,11 +31,13 @@ def run(arguments: argparse.Namespace) -> int:
     check_namespace(arguments.team)
     with Monitor(arguments.namespace, arguments.team, on_event=tell) as monitor:
         if not monitor.connect(_PATIENCE):
-            print(
-                f"error: {monitor.missing()}; start a suite with: planar-push launch single "
-                "(the system torque takes trajectories, not goals)",
-                file=sys.stderr,
+            remedy = (
+                f"name a team of the running suite by --team: {', '.join(monitor.teams)}"
+                if monitor.teams and arguments.team not in monitor.teams
+                else "start a suite with: planar-push launch single (the system torque takes "
+                "trajectories, not goals)"
             )
+            print(f"error: {monitor.missing()}; {remedy}", file=sys.stderr)
             return 1
         monitor.send_goal((arguments.x, arguments.y, arguments.theta))
         if arguments.no_wait:

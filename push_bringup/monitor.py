@@ -127,6 +127,15 @@ class Monitor:
         return "" if self.ready else f"no node subscribes to {self._names.team('goal_pose')}"
 
     @property
+    def teams(self) -> tuple[str, ...]:
+        """Names of the teams of the world that report their jobs."""
+        before, after = self._names.world(""), "/job_state"
+        names = (name for name, _ in self._node.get_topic_names_and_types())
+        found = (n for n in names if n.startswith(before) and n.endswith(after))
+        told = (n for n in found if int(self._node.count_publishers(n)) > 0)
+        return tuple(sorted(filter(None, (n[len(before) : -len(after)] for n in told))))
+
+    @property
     def goal_topic(self) -> str:
         """Where its goals go."""
         return str(self._names.team("goal_pose"))

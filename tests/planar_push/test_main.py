@@ -11,9 +11,9 @@ from benchmarks import NAMES
 from planar_push import arguments
 from planar_push.main import main, parser, verbs
 from push_bringup import launcher
-from push_msgs.msg import Poses
+from push_msgs.msg import JobState, Poses
 from push_ros.conversions import poses_to_ros
-from push_ros.qos import STREAM
+from push_ros.qos import LATCHED, STREAM
 from push_scenario.scenario import config_directory
 from push_study.study import experiment_names
 
@@ -196,6 +196,21 @@ def test_a_belief_on_the_command_line(text, expected):
             parsed(text)
     else:
         assert parsed(text) == (expected[0], Interval(*expected[1]))
+
+
+@pytest.mark.parametrize("words", [[], ["--team", "nosuch"]])
+def test_a_goal_without_the_name_of_its_team_is_told_the_names(words, ros, monkeypatch, capsys):
+    monkeypatch.setattr("planar_push.goal._PATIENCE", 1.0)
+    node = rclpy.create_node("somebody")
+    publishers = [
+        node.create_publisher(JobState, f"/{team}/job_state", LATCHED)
+        for team in ("south", "north")
+    ]
+    assert main(["goal", "0", "0", "0", *words]) == 1
+    assert "name a team of the running suite by --team: north, south" in capsys.readouterr().err
+    for publisher in publishers:
+        node.destroy_publisher(publisher)
+    node.destroy_node()
 
 
 @pytest.mark.parametrize("system", ["rearrange", "torque"])
