@@ -82,6 +82,25 @@ def runs_in_lockstep(domain: str) -> bool:
     return False
 
 
+@contextlib.contextmanager
+def on_this_machine() -> Iterator[None]:
+    """A context that is made in the block finds nodes on this machine only, and is found by them
+    only, whatever ROS_AUTOMATIC_DISCOVERY_RANGE says."""
+    before = os.environ.get(_RANGE)
+    os.environ[_RANGE] = "LOCALHOST"
+    try:
+        yield
+    finally:
+        _restore(_RANGE, before)
+
+
+def _restore(name: str, value: str | None) -> None:
+    if value is None:
+        os.environ.pop(name, None)
+    else:
+        os.environ[name] = value
+
+
 def claim_domain() -> int:
     """Set ROS_DOMAIN_ID to one that no other run on this machine has claimed, and in which no suite
     runs; returns it. It is not that of the caller's environment, where a suite may run later.
@@ -131,7 +150,4 @@ def own_domain() -> Iterator[int]:
     finally:
         release_domain(domain)
         for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
+            _restore(name, value)

@@ -25,7 +25,7 @@ from push_model.jobs import JobError
 from push_model.settings import SettingsError
 from push_msgs.msg import JobState
 from push_record.recorder import RecorderNode
-from push_ros.claims import claim_domain, claim_world
+from push_ros.claims import claim_domain, claim_world, on_this_machine
 from push_ros.names import Names, space
 from push_ros.pace_feed import pace_known
 from push_ros.process import Spinner, prepare_environment
@@ -123,7 +123,8 @@ class LockstepRun:
             raise SettingsError(f"'{scenario.name}' is for a lab; a run in lockstep is simulated")
         specs = nodes_of(system, scenario, namespace)
         if not rclpy.ok():
-            rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+            with on_this_machine():  # the robots of a lab elsewhere may have this domain
+                rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
             self._stack.callback(rclpy.try_shutdown)
         nodes: list[Node] = []
         try:

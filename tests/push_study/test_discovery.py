@@ -1,6 +1,7 @@
 """Nodes of a run wait for each other by what the middleware has done, not by a clock."""
 
 import itertools
+import os
 
 import pytest
 import rclpy
@@ -77,6 +78,21 @@ def test_a_run_does_not_begin_before_the_nodes_of_its_study_are_ready():
     with own_domain(), LockstepRun(load_scenario("env1-target1"), extra, quiet=True) as run:
         run.connect()
         assert made[0].asked > 25 and run.bridge.time == 0.0
+
+
+def test_a_run_is_heard_on_this_machine_only(monkeypatch):
+    """Also in a domain that somebody has chosen for a lab, and whose range is the network."""
+    name, ranges, initialise = "ROS_AUTOMATIC_DISCOVERY_RANGE", [], rclpy.init
+    monkeypatch.setenv(name, "SUBNET")
+
+    def noted(**words):
+        ranges.append(os.environ[name])
+        initialise(**words)
+
+    monkeypatch.setattr(rclpy, "init", noted)
+    with LockstepRun(load_scenario("short"), quiet=True):
+        pass
+    assert ranges == ["LOCALHOST"] and os.environ[name] == "SUBNET"
 
 
 def test_what_is_unmatched_is_named_until_it_is_found(ros):
