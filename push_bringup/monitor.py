@@ -61,6 +61,7 @@ class Monitor:
         self._gap: float | None = None  # [m] the distance that was told last
         self._owner = OwnerWatch(frozenset())
         self._missed = self._restarted = False
+        self._said: tuple[str, str] | None = None  # state and reason that were told last
 
     def __enter__(self) -> "Monitor":
         node, self._spinner = self._stack.enter_context(visitor(self._context))
@@ -148,7 +149,7 @@ class Monitor:
     def send_goal(self, goal: Pose) -> None:
         """Publish a goal (x, y, theta) [m, m, rad]."""
         self._goal = (float(goal[0]), float(goal[1]), float(goal[2]))
-        self._news, self._began, self._restarted = [], False, False
+        self._news, self._began, self._restarted, self._said = [], False, False, None
         self._job = 0 if self.state is None else int(self.state.job)
         self._owner = OwnerWatch(self._owners())
         self._begin, self._told, self._gap = self.stamp, time.monotonic(), None
@@ -182,7 +183,10 @@ class Monitor:
                 return replace(refused, code=code, reason=reason, refused=True)
             if self._pursues_mine(state):
                 self._began, self._job = True, int(state.job)
-                self._tell("state")
+                said = str(state.state_name), str(state.reason)
+                if said != self._said:  # and not again for progress alone
+                    self._said = said
+                    self._tell("state")
                 if state.state == JobState.IDLE:
                     duration = self.stamp - self._begin
                     return result_of(state, self._goal, self.pose, duration, self.team)

@@ -109,6 +109,22 @@ def test_another_goal_that_is_taken_replaces_ours(world):
     assert result.code is JobError.PREEMPTED and "another goal" in result.reason
 
 
+def test_a_state_is_told_once_whatever_its_progress(world):
+    monitor, events, (owner,), _ = world
+    goal = owner.heard[-1]
+
+    def told():
+        monitor.poll()
+        return [e for e in events if e.kind == "state"]
+
+    for count in range(1, 6):
+        owner.tell(JobState.PUSHING, "push 1 of 2", goal, code=count)
+        assert monitor.wait(15.0, lambda count=count: monitor.state.error_code == count)
+        assert len(told()) == 1
+    owner.tell(JobState.PUSHING, "push 2 of 2", goal)
+    assert monitor.wait(15.0, lambda: len(told()) == 2)
+
+
 @pytest.mark.parametrize("taken", [0, 1, 4])
 def test_a_restarted_owner_has_forgotten_the_job(world, taken):
     """Its count of jobs begins anew; it may have taken others' goals since."""
