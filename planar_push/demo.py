@@ -77,7 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.factor is not None:
             raise SettingsError("--factor: a run in lockstep has no pace; leave it out")
         _clear(out, (*PRODUCTS, "bag"))
-        return _conclude(_in_lockstep(arguments, scenario, out / "bag"), out)
+        return _conclude(_in_lockstep(arguments, scenario, out / "bag"), out, "true poses")
     check_domain(arguments.namespace)
     _clear(out, (*PRODUCTS, "bag"))  # nothing is wrong: an earlier demo may go
     suite = Suite(scenario, record=out / "bag", verbose=True, on_event=tell, **words)
@@ -93,7 +93,7 @@ def run(arguments: argparse.Namespace) -> int:
             print(f"error: {error}", file=sys.stderr)
     if suite.stop_requested:
         return 130
-    return _conclude(results, out)
+    return _conclude(results, out, "poses that were measured last")
 
 
 def _in_lockstep(
@@ -106,8 +106,8 @@ def _in_lockstep(
     return recorded_run(scenario, arguments.system, bag, **words)
 
 
-def _conclude(results: "dict[str, JobResult]", out: Path) -> int:
-    """Write the report; 0 if every object has reached its goal."""
+def _conclude(results: "dict[str, JobResult]", out: Path, poses: str) -> int:
+    """Write the report; 0 if every object has reached its goal. poses: which give the errors."""
     from push_view.report import PRODUCTS, write_report
 
     for result in results.values():
@@ -125,8 +125,7 @@ def _conclude(results: "dict[str, JobResult]", out: Path) -> int:
         good &= result.success  # within the tolerances of the system
         name = f"{result.team}: " if result.team else ""
         if math.isfinite(position):
-            true = "by the true poses; the job ends by the measured ones"
-            print(f"{name}final error: {1e3 * position:.1f} mm, {orientation:.3f} rad ({true})")
+            print(f"{name}final error: {1e3 * position:.1f} mm, {orientation:.3f} rad ({poses})")
     for file in (*PRODUCTS, "bag"):
         print(f"  {out / file}")
     return 0 if good else 1

@@ -98,6 +98,17 @@ def test_links_and_pictures_lead_somewhere(page):
             assert place in map(anchor, headings), target
 
 
+def test_no_line_of_a_page_is_a_comment():
+    """MyST drops a line that begins with a percent sign, and tears its paragraph in two."""
+    comments = [
+        f"{page.name}: {line}"
+        for page in PAGES
+        for line in page.read_text().splitlines()
+        if line.lstrip().startswith("%")
+    ]
+    assert not comments
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
 def test_files_that_a_page_names_exist(page):
     """Paths in back quotes: ``folder/file.py`` from the root, or a bare ``file.py`` anywhere."""
