@@ -31,9 +31,10 @@ def run(arguments: argparse.Namespace) -> int:
     check_namespace(arguments.team)
     with Monitor(arguments.namespace, arguments.team, on_event=tell) as monitor:
         if not monitor.connect(_PATIENCE):
+            teams = monitor.teams
             remedy = (
-                f"name a team of the running suite by --team: {', '.join(monitor.teams)}"
-                if monitor.teams and arguments.team not in monitor.teams
+                f"name a team of the running suite by --team: {', '.join(teams)}"
+                if teams and arguments.team not in teams
                 else "start a suite with: planar-push launch single (the system torque takes "
                 "trajectories, not goals)"
             )

@@ -101,7 +101,8 @@ class LtvMpc:
         total = error.sum() + reference.pose.sum() + reference.twist.sum() + circles.sum()
         if not math.isfinite(total):
             return self._failed("input is not finite", started)
-        held = reference.held if self._forward(contact) else None
+        forward = self._forward(contact)
+        held = reference.held if forward else None
         if held is not None:
             error = error.copy()
             error[3] += reference.twist[0, 0] - held.last[0]
@@ -124,7 +125,8 @@ class LtvMpc:
         # The tick is far shorter than a step: linearise about the same inputs next time.
         self._nominal = u.copy()
         self._previous = u[0].copy()
-        self._wanted = (reference.twist[1] - reference.twist[0])[[0, 2]] / self.settings.step
+        if forward:
+            self._wanted = (reference.twist[1] - reference.twist[0])[[0, 2]] / self.settings.step
         a, eps = u[0]
         if held is not None:  # the next command is followed by another before the step ends
             a += held.acceleration[0] - self._wanted[0]
