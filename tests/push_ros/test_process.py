@@ -137,10 +137,12 @@ def test_a_domain_is_given_back(domain, monkeypatch):
 
 
 def test_a_run_does_not_take_the_domain_of_its_caller(monkeypatch):
-    for number in range(1, 101):
-        monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
+    for _ in range(20):  # the following one may be claimed by others now and then
         with own_domain() as own:
-            assert own != number
+            following = 1 + own % 100
+        monkeypatch.setenv("ROS_DOMAIN_ID", str(following))
+        with own_domain() as own:
+            assert own != following
 
 
 def test_a_run_is_heard_on_this_machine_only(domain, monkeypatch):

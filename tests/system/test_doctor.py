@@ -84,6 +84,7 @@ def test_a_good_lab_is_called_good(domain, tmp_path):
         lab.__exit__()
     assert exit_code == 0 and "fact: DRIVES: epuck1 drives and turns as commanded" in text
     assert "0 errors" in text
+    assert "NO_SUITE" not in text, "with --drive no suite may run"
 
 
 def test_beside_a_suite_the_bridge_says_how_the_robots_are(domain, tmp_path):
