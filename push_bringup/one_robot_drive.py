@@ -43,7 +43,8 @@ class Drive:
             self._push = Push(grasp, limits, line_contact(near.robot, near.item, grasp))
         s = self.tracker.settings
         ends = s.position_tolerance, s.orientation_tolerance
-        self.tracker.start(Task(way, self._push, circles, *ends))
+        going_on = isinstance(command, commands.FollowPush) and command.going_on
+        self.tracker.start(Task(way, self._push, circles, *ends), going_on)
         return self.believe(belief) if belief.values or belief.outlines else None
 
     def believe(self, belief: Belief) -> events.Event | None:

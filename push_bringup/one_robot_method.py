@@ -21,6 +21,7 @@ from push_model.arrays import Array
 from push_model.belief import Belief
 from push_model.distance_field import DistanceField
 from push_model.jobs import GoalRefused, JobError, JobPhase
+from push_model.push_segment import PushSegment
 from push_model.settings import SettingsError
 from push_model.specs import ObjectSpec, RobotSpec
 from push_model.stick_certificate import ContactBelief
@@ -36,6 +37,7 @@ from push_supervisor import (
     Surroundings,
     commands,
     events,
+    repair,
 )
 from push_supervisor.arrival import Arrival, arrival
 from push_supervisor.blocked_way import BlockedWay
@@ -66,7 +68,9 @@ class OneRobotMethod:
         mpc = LtvMpc(arena.section("mpc", MpcSettings), arena.robot.differential)
         tracker = TrajectoryTracker(arena.section("tracker", TrackerSettings), mpc)
         self._drive = Drive(tracker, self._name, self._item)
-        self.machine = Machine(self._settings, self._at_goal, self._touching)
+        self.machine = Machine(
+            self._settings, self._at_goal, self._touching, beginning=self._beginning
+        )
         self._fire = EventQueue(self.machine, self._carry_out).fire
         self._displacement = Displacement(self.machine)
         self._blocked_way = BlockedWay(self.machine)
@@ -74,6 +78,7 @@ class OneRobotMethod:
         self._goal: Array | None = None  # of a task that no frame has come for yet
         self._seen: Seen | None = None
         self._question: Question | None = None  # a command that waits, or is worked on
+        self._repair: commands.Repair | None = None  # likewise, while the robot pushes
         self._not_before, self._looked = 0.0, math.nan
 
     def _around(self, robot: RobotSpec, item: ObjectSpec) -> Surroundings:
@@ -122,7 +127,7 @@ class OneRobotMethod:
 
     def step(self, seen: Seen, belief: Belief) -> Told:
         """See Method: a tick of the tracker, then what the state machine wants next. A plan is made
-        in slices, one a frame; the robot stands meanwhile."""
+        in slices, one a frame."""
         self._seen = seen
         self._take_up(belief)
         if self._goal is not None:
@@ -132,6 +137,8 @@ class OneRobotMethod:
             self._looked = seen.time
             self._tell(self._displacement.look(seen.object))
             robot = seen.robots.get(self._name)
+            if self.machine.repairing:
+                self._tell(repair.late(self.machine.segment, seen.object))
             self._tell(self._blocked_way.look(self._near, robot, seen.object, seen.obstacles))
         command, event = self._drive.follow(seen, self._near.robot.body_radius)
         self._tell(event)
@@ -155,12 +162,26 @@ class OneRobotMethod:
         if event is not None:
             self._fire(event)
 
+    def _beginning(self, push: PushSegment) -> PushSegment | None:
+        seen = self._seen
+        if seen is None or self._name not in seen.robots:
+            return None
+        return repair.beginning(self._near, push, seen.object, seen.obstacles)
+
     def _carry_out(self, command: Command) -> None:
-        self._question = None
+        self._question = self._repair = None
         self._plans.drop()
-        if isinstance(command, commands.Stop | commands.CancelPlan | commands.Finish):
-            self._drive.tracker.stop()
-            return
+        match command:
+            case commands.Repair():
+                self._repair = command
+            case commands.CancelRepair() | commands.Finish(going_on=True):
+                pass
+            case commands.Stop() | commands.CancelPlan() | commands.Finish():
+                self._drive.tracker.stop()
+            case _:
+                self._ask(command)
+
+    def _ask(self, command: Question) -> None:
         assert self._seen is not None
         waits = isinstance(command, commands.MakePlan | commands.FindPath) and command.later
         self._not_before = self._seen.time + (self._settings.wait if waits else 0.0)
@@ -168,10 +189,12 @@ class OneRobotMethod:
 
     def _answer(self, seen: Seen, belief: Belief) -> float:
         """See to the question under way; [s] of CPU time that planning took."""
-        question, began = self._question, time.thread_time()
-        if question is None or seen.time < self._not_before:
+        question, began = self._repair or self._question, time.thread_time()
+        if question is None or (question is self._question and seen.time < self._not_before):
             return 0.0
         match question:
+            case commands.Repair():
+                event = self._plans.repair(question, self._near, seen)
             case commands.MakePlan():
                 event = self._plans.plan(question, seen.robots[self._name], seen)
             case commands.FindPath():

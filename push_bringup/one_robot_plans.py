@@ -1,6 +1,7 @@
 """What one robot plans: pushes of its object, and its own way to the next one. No ROS, no clock."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,12 +20,13 @@ from push_planner import (
     PushPlan,
     PushPlanner,
     TooHeavy,
+    going_on,
     joined,
     plan_among_bodies,
     plan_robot_path,
     warm_up,
 )
-from push_supervisor import Surroundings, commands, events, motions
+from push_supervisor import Surroundings, commands, events, motions, repair
 
 _NO_BODY_MATTERS = (PlanError.INVALID_GOAL, PlanError.OUTSIDE_MAP)
 
@@ -69,12 +71,26 @@ class Plans:
         """No plan is wanted any more."""
         self._work = None
 
-    def plan(self, command: commands.MakePlan, robot: Array, seen: Seen) -> events.Event | None:
+    def repair(
+        self, command: commands.Repair, near: Surroundings, seen: Seen
+    ) -> events.Event | None:
+        """Do one slice of the work on a plan that begins with the push under way."""
+        push = command.segment
+        then, robot = replace(seen, object=push.object_end), repair.robot(near, push)
+        event = self.plan(commands.MakePlan(command.goal), robot, then, push.side)
+        if isinstance(event, events.PlanFound):
+            drive = self._specs[0].differential
+            event = events.PlanFound(going_on(push, event.segments, drive, self._settings))
+        return event
+
+    def plan(
+        self, command: commands.MakePlan, robot: Array, seen: Seen, on_side: int | None = None
+    ) -> events.Event | None:
         """Do one slice of the work on a plan; the plan, or why there is none, after the last."""
         if self._work is None:
             self._draws += command.preemptive
             self._best: PushPlan | None = None
-            self._work = self._begin(command.goal, seen, robot, self._draws * command.preemptive)
+            self._work = self._begin(command, seen, robot, on_side)
         try:
             self._best = next(self._work).best
             return None
@@ -91,9 +107,12 @@ class Plans:
         self._work = None
         return answer
 
-    def _begin(self, goal: Array, seen: Seen, robot: Array, preemptive: int) -> Iterator[Progress]:
-        planner = self.planner(*self._specs)
-        yield from plan_among_bodies(planner, seen.object, goal, seen.obstacles, preemptive, robot)
+    def _begin(
+        self, command: commands.MakePlan, seen: Seen, robot: Array, on_side: int | None
+    ) -> Iterator[Progress]:
+        planner, draw = self.planner(*self._specs), self._draws * command.preemptive
+        ends, bodies = (seen.object, command.goal), seen.obstacles
+        yield from plan_among_bodies(planner, *ends, bodies, draw, robot, on_side)
 
     def way(
         self, command: commands.FindPath, robot: Array, seen: Seen, near: Surroundings

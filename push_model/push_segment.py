@@ -1,6 +1,6 @@
 """One push of a plan, as planner, supervisor and controller use it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,6 +37,24 @@ class PushSegment:
     clearance: float
     trajectory: Trajectory
     turns: bool = False
+
+    def part(self, begin: float, end: float) -> "PushSegment":
+        """The push between two times [s] along its trajectory, at the speeds of the whole.
+
+        ``k_start``, ``k_end`` and ``clearance`` are those of the whole push.
+        """
+        way = self.trajectory.between(begin, end)
+        grasp = self.grasp
+        return replace(
+            self,
+            object_start=se2.compose(way.pose[0], grasp),
+            object_end=se2.compose(way.pose[-1], grasp),
+            robot_start=way.pose[0],
+            robot_end=way.pose[-1],
+            standoff=se2.compose(way.pose[0], se2.between(self.robot_start, self.standoff)),
+            length=way.length,
+            trajectory=way,
+        )
 
     @property
     def grasp(self) -> Array:

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from push_model.arrays import Array
 from push_model.kinematics import DifferentialDrive
 
+_SHORTEST = 1e-3  # [s] of a part
+_SAME = 1e-6  # [s] between samples, at least
+
 
 @dataclass(frozen=True)
 class Trajectory:
@@ -43,6 +46,25 @@ class Trajectory:
     def duration(self) -> float:
         """[s]."""
         return float(self.time[-1])
+
+    @cached_property
+    def travelled(self) -> Array:
+        """``(n,)`` [m] of path of the axle midpoint up to each sample."""
+        steps = np.hypot(*np.diff(self.pose[:, :2], axis=0).T)
+        return np.concatenate([[0.0], np.cumsum(steps)])
+
+    @property
+    def length(self) -> float:
+        """[m] of path of the axle midpoint."""
+        return float(self.travelled[-1])
+
+    def between(self, begin: float, end: float) -> "Trajectory":
+        """The part between two times [s], at the speeds of the whole; at least ``_SHORTEST``."""
+        begin = min(max(begin, 0.0), self.duration - _SHORTEST)
+        end = min(max(end, begin + _SHORTEST), self.duration)
+        inner = self.time[(self.time > begin + _SAME) & (self.time < end - _SAME)]
+        time = np.concatenate([[begin], inner, [end]])
+        return Trajectory(time - begin, *self.sample(time))
 
     def sample(self, t: NDArray[np.floating[Any]]) -> tuple[Array, Array]:
         """Poses ``(m, 3)`` and twists ``(m, 2)`` at times ``(m,)``; at rest beyond the ends."""

@@ -154,7 +154,7 @@ class FollowerNode(Node):
             check=self._parse,
             start=self._begin,
             cancel=self._canceled,
-            preempt=lambda request: self._preempt(),
+            preempt=self._preempt,
         )
         gate, bodies = self.follower.gate, self.follower.bodies
         self.poses = PoseFeed(self, names, gate, bodies, self.diagnostics, self._on_frame)
@@ -182,7 +182,11 @@ class FollowerNode(Node):
         return self.follower.parse(request)
 
     def _begin(self, request: Any) -> None:
-        task = self._parse(request)
+        try:
+            task = self._parse(request)
+        except InvalidMessage as error:  # a push to go on with may have ended since it was checked
+            self.end(FollowTrajectory.Result.INVALID_GOAL, str(error))
+            return
         self._heartbeat.begin(float(request.heartbeat_timeout))
         self._held = 0.0
         pushing = request.mode == FollowTrajectory.Goal.PUSH
@@ -190,9 +194,14 @@ class FollowerNode(Node):
         self._mode, self._reason = self._at_work, _AT_WORK
         self.follower.begin(request, task)
 
-    def _preempt(self) -> None:
-        if self._server.active:
-            self.end(FollowTrajectory.Result.PREEMPTED, "a new trajectory replaces this one")
+    def _preempt(self, request: Any) -> None:
+        if not self._server.active:
+            return
+        code, why = FollowTrajectory.Result.PREEMPTED, "a new trajectory replaces this one"
+        if request.going_on:  # without a stop
+            self._server.finish(FollowTrajectory.Result(error_code=code, error_msg=why), False)
+        else:
+            self.end(code, why)
 
     def _canceled(self) -> None:
         self.end(FollowTrajectory.Result.CANCELED, "canceled")

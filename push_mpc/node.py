@@ -8,6 +8,7 @@ import sys
 from collections.abc import Collection, Mapping
 from typing import Any
 
+import numpy as np
 from geometry_msgs.msg import TwistStamped
 
 from push_estimation.pose_gate import PoseGateSettings
@@ -15,6 +16,7 @@ from push_model.arrays import Array
 from push_model.belief import POSES
 from push_model.settings import SettingsError
 from push_model.stick_certificate import ContactBelief
+from push_model.trajectory import Trajectory
 from push_mpc import Push, Task, Tick, TrackerSettings, TrajectoryTracker, controller_kind
 from push_mpc.believed_push import Unstable, believed_push
 from push_mpc.follower_node import Command, Followed, FollowerKind, FollowerNode
@@ -40,6 +42,7 @@ from push_ros.scheduling import Urgency
 from push_ros.validation import InvalidMessage, finite, planar_pose
 from push_scenario.scenario import Scenario
 
+_SAME = 1e-6  # [m], [rad] between poses in which two pushes begin
 _REPORTS = 0.05  # [s] of pose time between reports
 
 
@@ -137,6 +140,10 @@ class VelocityFollower:
             item = self._beliefs.current.object(request.object)
             line = line_contact(self._spec, item, grasp)
             push = Push(grasp, limits_from_ros(request), line)
+            if request.going_on:
+                self._check_going_on(request.object, trajectory)
+        elif request.going_on:
+            raise InvalidMessage("only a push can go on where another one is")
         elif request.mode != FollowTrajectory.Goal.MOVE:
             raise InvalidMessage(f"unknown mode {request.mode}")
         if min(tolerances) < 0.0:
@@ -150,12 +157,20 @@ class VelocityFollower:
             tolerances[1] or s.orientation_tolerance,
         )
 
+    def _check_going_on(self, item: str, trajectory: Trajectory) -> None:
+        """Raise InvalidMessage unless a push of the object is under way that begins like this."""
+        old = self.tracker.trajectory if self._told_push is not None else None
+        if old is None or item != self._object:
+            raise InvalidMessage(f"there is no push of '{item}' to go on with")
+        if np.abs(trajectory.pose[0] - old.pose[0]).max() > _SAME:
+            raise InvalidMessage("the push under way begins in another pose")
+
     def begin(self, request: Any, task: Task) -> None:
         """See Follower."""
         self._object, self._told_push = request.object, task.push
         self._alarmed = False
         self._reported = -math.inf  # the clock may have been reset
-        self.tracker.start(task)
+        self.tracker.start(task, bool(request.going_on))
         if self._beliefs.current.values:
             self._take_up()
 

@@ -29,6 +29,15 @@ class ReferenceClock:
         self._rate = 0.0
         self._passed = 0.0  # [s] of the trajectory, since the last command
 
+    def moved_to(self, trajectory: Trajectory) -> "ReferenceClock":
+        """A clock of another trajectory, which begins like this one, at the same place."""
+        old, new = self.trajectory, trajectory
+        way = float(np.interp(self.time, old.time, old.travelled))
+        clock = ReferenceClock(self._settings, new)
+        clock.time = float(np.interp(way, new.travelled, new.time))
+        clock._rate, clock._passed = self._rate, self._passed
+        return clock
+
     @property
     def ended(self) -> bool:
         """Whether the trajectory is over."""

@@ -97,6 +97,8 @@ class TorqueFollower:
                 "the torque controller accepts only the mode MOVE; an object that is pushed is "
                 "a disturbance"
             )
+        if request.going_on:
+            raise InvalidMessage("only a push can go on where another one is")
         return trajectory_from_ros(request.trajectory)
 
     def begin(self, request: Any, task: Trajectory) -> None:

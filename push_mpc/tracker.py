@@ -19,6 +19,7 @@ from push_model import se2
 from push_model.arrays import Array
 from push_model.stable_push import CurvatureLimits, shifted_limits
 from push_model.stick_certificate import stick_margin, trusted_limits
+from push_model.trajectory import Trajectory
 from push_mpc.checks import EndCheck, FailureCheck
 from push_mpc.command import Command
 from push_mpc.controller import Contact, MpcResult, PredictiveController, Reference
@@ -45,6 +46,7 @@ class TrajectoryTracker:
         self._reckoning = DeadReckoning(settings.pose_delay)
         self._in_force = (0.0, 0.0)  # the answer to the previous frame
         self._task: Task | None = None
+        self._clock: ReferenceClock
 
     @property
     def active(self) -> bool:
@@ -72,6 +74,11 @@ class TrajectoryTracker:
         return self._command.failures
 
     @property
+    def trajectory(self) -> Trajectory | None:
+        """Of the task, if there is one."""
+        return None if self._task is None else self._task.trajectory
+
+    @property
     def push(self) -> Push | None:
         """What the task pushes, if it does."""
         return None if self._task is None else self._task.push
@@ -86,21 +93,35 @@ class TrajectoryTracker:
         """Compile and solve once, so that the first command does not wait."""
         self.controller.warm_up()
 
-    def start(self, task: Task) -> None:
-        """Begin a task; the reference starts with the next tick."""
-        self._task = task
+    def start(self, task: Task, going_on: bool = False) -> None:
+        """Begin a task; the reference starts with the next tick.
+
+        going_on: the trajectory begins like the one under way, at the same contact. The reference
+        goes on from where it is.
+        """
+        if going_on:
+            if self._task is None:
+                raise RuntimeError("there is no task to go on with")
+            self._clock = self._clock.moved_to(task.trajectory)
+            self._checks(task)
+            return
+        self._checks(task)
         self._clock = ReferenceClock(self.settings, task.trajectory)
         self._grasp = (
             None
             if task.push is None
             else GraspEstimate(task.push.grasp, self.settings.grasp_filter)
         )
-        self._end = EndCheck(self.settings, task)
-        self._failure = FailureCheck(self.settings, self.controller.drive.half_track)
         self._changed = False  # whether a belief was taken up in this task
         self._lag = 0.0  # [m] behind the reference in the previous tick
         self._command.start()
         self.controller.reset()
+
+    def _checks(self, task: Task) -> None:
+        """Take a task, and what tells whether it has ended or failed."""
+        self._task = task
+        self._end = EndCheck(self.settings, task)
+        self._failure = FailureCheck(self.settings, self.controller.drive.half_track)
 
     def stop(self) -> None:
         """Drop the task and the command."""

@@ -31,6 +31,7 @@ def plan_among_bodies(
     circles: Array,
     preemptive: int = 0,
     robot: Array | None = None,
+    on_side: int | None = None,
 ) -> Iterator[Progress]:
     """The work on a request, in slices as of ``PushPlanner.plan``.
 
@@ -42,6 +43,7 @@ def plan_among_bodies(
         each draws others.
     robot: pose ``(3,)`` of the robot, from which it must have a way to the first side; None if
         unknown.
+    on_side: index of the side on which the robot pushes when the plan begins; None if on none.
 
     Raises
     ------
@@ -54,4 +56,4 @@ def plan_among_bodies(
     planner = planner_among(planner, start, circles)
     if preemptive:
         return plan_after_preemptive_push(planner, start, goal, settings.seed + preemptive, robot)
-    return planner.plan(start, goal, robot=robot)
+    return planner.plan(start, goal, robot=robot, on_side=on_side)

@@ -12,6 +12,7 @@ from rclpy.node import Node
 
 from push_model.arrays import Array
 from push_model.occupancy import OccupancyGrid as Grid
+from push_model.push_segment import PushSegment
 from push_model.settings import SettingsError
 from push_model.stick_certificate import ContactBelief
 from push_msgs.action import PlanPush
@@ -27,6 +28,7 @@ from push_planner import (
     PushPlan,
     PushPlanner,
     TooHeavy,
+    going_on,
     joined,
     plan_among_bodies,
     plan_robot_path,
@@ -38,6 +40,7 @@ from push_ros.conversions import (
     circles_from_ros,
     path_to_ros,
     plan_to_ros,
+    segment_from_ros,
     trajectory_to_ros,
 )
 from push_ros.diagnostics import Diagnostics
@@ -76,6 +79,7 @@ class PlannerNode(Node):
         self._field: DistanceField | None = None  # of the grid
         self._work: Iterator[Progress] | None = None
         self._best: PushPlan | None = None
+        self._under_way: list[PushSegment] = []  # at most one, with which the plan begins
         self._queued = False  # whether a slice waits for its turn
         self._draws = 0  # requests for pre-emptive pushes: each draws others
         self.plans = self.failures = 0
@@ -188,6 +192,9 @@ class PlannerNode(Node):
             goal = planar_pose(request.goal.pose, "the goal")
             here = request.robot_pose
             robot = planar_pose(here.pose, "the robot's pose") if here.header.frame_id else None
+            if len(request.under_way) > 1:
+                raise InvalidMessage("at most one push can be under way")
+            self._under_way = [segment_from_ros(segment) for segment in request.under_way]
             self._work = self._plan(request, start, goal, robot)
             self._continue()
         except TooHeavy as error:
@@ -218,7 +225,8 @@ class PlannerNode(Node):
         preemptive = request.mode == PlanPush.Goal.PREEMPTIVE
         self._draws += preemptive
         draw = self._draws * preemptive
-        return plan_among_bodies(planner, start, goal, circles, draw, robot)
+        sides = [segment.side for segment in self._under_way]
+        return plan_among_bodies(planner, start, goal, circles, draw, robot, *sides)
 
     def _continue(self) -> None:
         """Queue the next slice behind whatever else the executor has to do."""
@@ -263,6 +271,8 @@ class PlannerNode(Node):
         item, _ = self._scenario.object(self._request.object)
         now = self._now()
         pushes = joined(plan.segments, spec.differential, self.settings)
+        for under_way in self._under_way:
+            pushes = going_on(under_way, pushes, spec.differential, self.settings)
         plan = replace(plan, segments=pushes)
         self._plan_message = plan_to_ros(plan, robot, item, now)
         self._plan_publisher.publish(self._plan_message)

@@ -67,12 +67,25 @@ class PlanTime:
         mean = float(parts @ (0.5 * (pace[1:] + pace[:-1])) / parts.sum())
         return curve.length * mean
 
-    def of_plan(self, segments: Sequence[PushSegment], change_weight: float = 1.0) -> float:
+    def change(self, before: int | None, after: int) -> float:
+        """[s] of a change from a side to another, by their indices; 0 where there is none before
+        or it has no contact."""
+        if before is None or before not in self._numbers:
+            return 0.0
+        return float(self.changes[self._numbers[before], self._numbers[after]])
+
+    def of_plan(
+        self,
+        segments: Sequence[PushSegment],
+        change_weight: float = 1.0,
+        on_side: int | None = None,
+    ) -> float:
         """[s] of pushes one after another: the cost of a plan.
 
         change_weight: fraction of the time of a change of the side that counts.
+        on_side: index of the side on which the robot pushes when the plan begins.
         """
-        total = 0.0
+        total = change_weight * self.change(on_side, segments[0].side)
         before: PushSegment | None = None
         for s in segments:
             goes_on = before is not None and s.side == before.side and not (s.turns or before.turns)
@@ -82,7 +95,7 @@ class PlanTime:
                 curve = PushCurve(s.robot_start, s.robot_end, s.k_start, s.k_end, s.length)
                 total += self.of_push(curve) + self.begin * (not goes_on)
             if before is not None:
-                change = float(self.changes[self._numbers[before.side], self._numbers[s.side]])
+                change = self.change(before.side, s.side)
                 # After a push on a corner the robot backs off, also if it goes on on the same side.
                 total += change_weight * max(change, before.turns * self._contact_time)
             before = s

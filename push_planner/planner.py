@@ -86,12 +86,14 @@ class PushPlanner:
         seed: int | None = None,
         thorough: bool = True,
         robot: Array | None = None,
+        on_side: int | None = None,
     ) -> Iterator[Progress]:
         """Plan in small slices: each ``next`` does a little work and reports.
 
         thorough: whether a long search follows where the others find no plan, and whether the lower
         bound is raised by searches. robot: ``(3,)`` pose of the robot, from which it
-        must have a way to the first side; None if unknown.
+        must have a way to the first side; None if unknown. on_side: index of the side on which the
+        robot pushes when the plan begins: to go on there takes no change of the side.
 
         The last report carries the final plan, with the lower bound of all costs. A plan that is
         reported never costs more than one before it; only the final one may, by ``easing``.
@@ -103,14 +105,15 @@ class PushPlanner:
         PlanningFailed: when there is no plan; from the ``next`` that finds it out.
         """
         settings = self.settings
-        work = Work(settings, settings.seed if seed is None else seed, robot)
+        work = Work(settings, settings.seed if seed is None else seed, robot, on_side)
         start = np.array([start[0], start[1], se2.wrap(start[2])])
         goal = np.array([goal[0], goal[1], se2.wrap(goal[2])])
         self.check(start, "start", PlanError.START_OCCUPIED)
         self.check(goal, "goal", PlanError.GOAL_OCCUPIED)
         check_room(self.scene, start, "pushed away from the start", True)
         check_room(self.scene, goal, "pushed into the goal")
-        check_way(self.scene, start, robot)
+        if on_side is None:
+            check_way(self.scene, start, robot)
         ends = start, goal
         start, goal = (self.scene.item.mass_pose(pose) for pose in ends)
         guides = Guides(self._guides(start, goal, work.seed), work, settings.rrt_iterations)
@@ -200,14 +203,14 @@ class PushPlanner:
                 break
             if number == 0 and best.cost > (1.0 + _NEAR_BOUND) * work.least:
                 found = yield from self._over_arcs(best, ends[1], run_ends, work)
-                if found is not best:
+                if found.cost < best.cost:
                     best = found
                     yield Progress("improving", best)
                     continue
             if number == 0:
                 count, most = settings.improvement_poses, settings.improvement_expansions // 2
                 graph = self._graph(start, goal, guides.all()[-1], 1, count, 0, work)
-                bound = (1.0 - _WORTH) * self.scene.time.of_plan(best.segments, _HASTE)
+                bound = (1.0 - _WORTH) * self._cost(best.segments, work, _HASTE)
             else:
                 most = work.left
                 between = [self.scene.item.mass_pose(s.object_end) for s in best.segments[:-1]]
@@ -216,7 +219,9 @@ class PushPlanner:
                 size = settings.refinement / 2.0 ** ((number - 1) % _SIZES / 2)
                 poses = nearby(np.array(between), _NEARBY, size, work.random)
                 free = poses.free(self.scene)
-                graph = PushGraph(self.scene, start, goal, free, np.inf, work.robot)
+                graph = PushGraph(
+                    self.scene, start, goal, free, np.inf, work.robot, on_side=work.on_side
+                )
             search = PushSearch(graph, bound, 1.0, min(most, work.effort()))
             for _ in search.run(work.statistics):
                 yield Progress(f"improving, round {number + 1}", best)
@@ -245,10 +250,18 @@ class PushPlanner:
 
     def _eased(self, best: PushPlan, work: Work) -> PushPlan:
         """The best plan with wider bends, or itself."""
-        found = gentler(
-            self.scene, best.segments, best.cost, work.robot, work.random, work.statistics
-        )
-        return best if found is None else self._assemble(found, best.goal, best.guide, work)
+        cost = self.scene.time.of_plan(best.segments)
+        found = gentler(self.scene, best.segments, cost, work.robot, work.random, work.statistics)
+        if found is None:
+            return best
+        eased = self._assemble(found, best.goal, best.guide, work)
+        far = work.on_side is not None and eased.segments[0].side != best.segments[0].side
+        return best if far else eased
+
+    def _cost(
+        self, segments: Sequence[PushSegment], work: Work, change_weight: float = 1.0
+    ) -> float:
+        return self.scene.time.of_plan(segments, change_weight, work.on_side)
 
     def _refusal(self, ends: _Ends, guides: Sequence[GuidePath], work: Work) -> PlanningFailed:
         widest = max(guide.clearance for guide in guides)
@@ -302,7 +315,7 @@ class PushPlanner:
         spacing = max(settings.waypoint_spacing, guide.length / most)
         reach = max(_REACH[0] * settings.waypoint_spacing, _REACH[1] * spacing)
         free = candidates.free(scene)
-        return PushGraph(scene, start, goal, free, reach, work.robot, _HASTE)
+        return PushGraph(scene, start, goal, free, reach, work.robot, _HASTE, on_side=work.on_side)
 
     def solve(self, start: Array, goal: Array, seed: int | None = None) -> PushPlan:
         """The final plan of ``plan``."""
@@ -361,6 +374,6 @@ class PushPlanner:
         work: Work,
     ) -> PushPlan:
         segments = tuple(self.segment(step) for step in steps)
-        clearance, cost = min(s.clearance for s in segments), self.scene.time.of_plan(segments)
+        clearance, cost = min(s.clearance for s in segments), self._cost(segments, work)
         least, counted = min(work.least, cost), work.counted(guide)
         return PushPlan(goal, segments, cost, least, clearance, guide, counted)

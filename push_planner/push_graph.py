@@ -68,6 +68,7 @@ class PushGraph:
         reach: float,
         robot: Array | None = None,
         change_weight: float = 1.0,
+        on_side: int | None = None,
     ) -> None:
         """Build the graph.
 
@@ -79,8 +80,10 @@ class PushGraph:
         reach: [m] longest distance along Gamma that one push may cover.
         robot: ``(3,)`` pose of the robot before the first push; None if unknown.
         change_weight: fraction of the time of a change of the side that counts.
+        on_side: index of the side on which the robot pushes at the start; None if it does not.
         """
         self.scene = scene
+        self._on_side = on_side
         self._robot = robot
         self._ways: dict[tuple[int, int, int], bool] = {}
         order = np.argsort(candidates.way, kind="stable")
@@ -122,6 +125,7 @@ class PushGraph:
         # After a change the robot speeds up anew.
         self._changes = change_weight * time.changes
         self._changes += time.begin * (1.0 - np.eye(len(self._changes)))
+        self._first = [change_weight * time.change(on_side, s.index) for s in scene.sides]
         self.begin = time.begin
         """[s] that the first push takes longer, because the robot speeds up and brakes."""
         self._pace = time.pace
@@ -225,9 +229,13 @@ class PushGraph:
             return math.inf
         return float(self._changes[before, after])
 
+    def first_change(self, side: int) -> float:
+        """Cost [s] of changing to a side at the start; 0 if the robot does not push there."""
+        return self._first[side]
+
     def may_begin(self, side: int) -> bool:
         """Whether the robot can go from where it is to a side at the start, as far as is known."""
-        if self._robot is None:
+        if self._robot is None or self.scene.sides[side].index == self._on_side:
             return True
         key = (0, -1, side)
         if key not in self._ways:

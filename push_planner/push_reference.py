@@ -13,6 +13,7 @@ from push_model.trajectory import Trajectory, along_curve
 from push_planner.push_curve import PushCurve
 from push_planner.settings import PlannerSettings
 
+_MOVING = 1e-3  # [m/s] of a sample that has a curvature
 _SPACING = 0.005  # [m] of samples
 _SAMPLES = 20  # of a curve, at least
 
@@ -25,19 +26,32 @@ def push_reference(
     The speed at each curvature is the greatest that ``push_speed`` and the wheels, less their
     reserve, allow. Where the curvature jumps from one curve to the next, the robot does not stop.
     """
-    points: list[Array] = []
-    heading: list[Array] = []
-    curvature: list[Array] = []
-    for curve in curves:
-        p, h, k = curve.sample(max(_SAMPLES, int(curve.length / _SPACING)))
-        first = 1 if points else 0
-        points.append(p[first:])
-        heading.append(h[first:])
-        curvature.append(k[first:])
+    return _along([_of_curve(curve) for curve in curves], drive, settings)
+
+
+def _of_curve(curve: PushCurve) -> Array:
+    """``(n, 4)`` x, y [m], heading [rad] and curvature [1/m] of a curve."""
+    return np.column_stack(curve.sample(max(_SAMPLES, int(curve.length / _SPACING))))
+
+
+def _of_trajectory(trajectory: Trajectory) -> Array:
+    """The same of a push that has a reference already."""
+    v, omega = trajectory.twist.T
+    moving = np.flatnonzero(v > _MOVING)
+    time = trajectory.time
+    curvature = np.interp(time, time[moving], omega[moving] / v[moving])
+    return np.column_stack([trajectory.pose, curvature])
+
+
+def _along(
+    parts: Sequence[Array], drive: DifferentialDrive, settings: PlannerSettings
+) -> Trajectory:
+    """Rest to rest along paths ``(n, 4)``, each of which begins where the one before ends."""
+    x, y, heading, curvature = np.vstack([parts[0], *(part[1:] for part in parts[1:])]).T
     return along_curve(
-        np.vstack(points),
-        np.unwrap(np.concatenate(heading)),
-        np.concatenate(curvature),
+        np.column_stack([x, y]),
+        np.unwrap(heading),
+        curvature,
         drive,
         settings.push_speed,
         settings.push_acceleration,
@@ -69,3 +83,33 @@ def joined(
             )
         )
     return tuple(result)
+
+
+def going_on(
+    under_way: PushSegment,
+    segments: Sequence[PushSegment],
+    drive: DifferentialDrive,
+    settings: PlannerSettings,
+) -> tuple[PushSegment, ...]:
+    """A push that is under way, and after it pushes of a plan that begins where it ends.
+
+    Where the plan goes on on the same side, its first push and the one under way become one without
+    a stop. Otherwise the one under way comes to rest at its end.
+
+    segments: as they are carried out, see ``joined``.
+    """
+    first, begun = segments[0], _of_trajectory(under_way.trajectory)
+    if first.side != under_way.side or first.turns:
+        head = replace(under_way, trajectory=_along([begun], drive, settings))
+        return head, *segments
+    parts = [begun, _of_trajectory(first.trajectory)]
+    whole = replace(
+        under_way,
+        object_end=first.object_end,
+        robot_end=first.robot_end,
+        k_end=first.k_end,
+        length=under_way.length + first.length,
+        clearance=min(under_way.clearance, first.clearance),
+        trajectory=_along(parts, drive, settings),
+    )
+    return whole, *segments[1:]

@@ -130,6 +130,8 @@ class PushSearch:
                 continue
             cost = node.cost + step.time
             cost += graph.side_change(node.pose, side, node.side)
+            if pose == 0:
+                cost += graph.first_change(side)
             total = cost + self.weight * float(ready[pose, side])
             plain = cost + float(ready[pose, side])
             if plain < self.bound and cost < cheapest.get((pose, side), math.inf):
@@ -146,7 +148,8 @@ class PushSearch:
         for side in range(len(graph.scene.sides)):
             if graph.worth_leaving_for(side, len(graph.poses) - 1) and graph.may_begin(side):
                 step = graph.push(0, len(graph.poses) - 1, side, statistics)
-                if step is not None and (cost := graph.begin + step.time) < self.bound:
+                cost = graph.begin + graph.first_change(side) + (step.time if step else math.inf)
+                if step is not None and cost < self.bound:
                     self.solution, self.cost, self.bound = (step,), cost, cost
 
 

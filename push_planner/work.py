@@ -15,8 +15,10 @@ from push_planner.settings import PlannerSettings
 class Work:
     """What has been spent on one plan, and what is left."""
 
-    def __init__(self, settings: PlannerSettings, seed: int, robot: Array | None) -> None:
-        self.seed, self.robot = seed, robot
+    def __init__(
+        self, settings: PlannerSettings, seed: int, robot: Array | None, on_side: int | None = None
+    ) -> None:
+        self.seed, self.robot, self.on_side = seed, robot, on_side
         self.random = np.random.default_rng(seed)
         self.statistics = SearchStatistics()
         self.iterations = self.poses = 0

@@ -144,9 +144,18 @@ class GoalClient:
         return bool(self._client.server_is_ready())
 
     def send(
-        self, goal: Any, done: Callable[[Any], None], feedback: Callable[[Any], None] | None = None
+        self,
+        goal: Any,
+        done: Callable[[Any], None],
+        feedback: Callable[[Any], None] | None = None,
+        cancel: bool = True,
     ) -> None:
-        """Send a goal; ``done`` gets the result, or None when the goal was rejected."""
+        """Send a goal; ``done`` gets the result, or None when the goal was rejected.
+
+        cancel: whether the goal before is canceled; if not, the server replaces it.
+        """
+        if not cancel:
+            self._handle = None
         self.forget()
         token = self._token
 

@@ -44,9 +44,10 @@ class FollowApproach:
 
 @dataclass(frozen=True)
 class FollowPush:
-    """Push."""
+    """Push. going_on: the push begins like the one under way; go on where that one is."""
 
     segment: PushSegment
+    going_on: bool = False
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,19 @@ class FollowRetreat:
 
 
 @dataclass(frozen=True)
+class Repair:
+    """Plan from the end of the push that is under way, while the robot goes on with it."""
+
+    goal: Array
+    segment: PushSegment
+
+
+@dataclass(frozen=True)
+class CancelRepair:
+    """The plan that is made while the robot pushes is not wanted any more."""
+
+
+@dataclass(frozen=True)
 class CancelPlan:
     """No plan is wanted any more."""
 
@@ -73,10 +87,12 @@ class Stop:
 
 @dataclass(frozen=True)
 class Finish:
-    """Tell whoever waits how the job ended."""
+    """Tell whoever waits how the job ended. going_on: the robot goes on pushing for the next job,
+    whose goal follows at once."""
 
     code: JobError
     message: str
+    going_on: bool = False
 
 
 Motion = FollowPath | FollowApproach | FollowPush | FollowTurn | FollowRetreat
@@ -85,4 +101,4 @@ Motion = FollowPath | FollowApproach | FollowPush | FollowTurn | FollowRetreat
 Question = MakePlan | FindPath | Motion
 """Commands that another node answers."""
 
-Command = Question | CancelPlan | Stop | Finish
+Command = Question | Repair | CancelRepair | CancelPlan | Stop | Finish

@@ -22,8 +22,10 @@ class EventQueue:
         self._waiting: list[Event] = []
         self._handling = False
 
-    def fire(self, event: Event) -> None:
-        """Give an event to the machine."""
+    def fire(self, event: Event | None) -> None:
+        """Give an event to the machine; None is none."""
+        if event is None:
+            return
         self._waiting.append(event)
         if self._handling:
             return

@@ -10,10 +10,12 @@ from push_model.trajectory import Trajectory
 
 @dataclass(frozen=True)
 class GoalGiven:
-    """goal: ``(3,)`` pose of the object; plan_only: wait for the execute command."""
+    """goal: ``(3,)`` pose of the object; plan_only: wait for the execute command; item: name of the
+    object."""
 
     goal: Array
     plan_only: bool = False
+    item: str = ""
 
 
 @dataclass(frozen=True)
@@ -93,6 +95,11 @@ class WayBlocked:
 
 
 @dataclass(frozen=True)
+class RepairLate:
+    """The robot has come to where a new plan was to begin, and there is none yet."""
+
+
+@dataclass(frozen=True)
 class ClockReset:
     """The clock of the poses went back."""
 
@@ -118,6 +125,7 @@ Event = (
     | ObjectMoved
     | MapChanged
     | WayBlocked
+    | RepairLate
     | ClockReset
     | JobAborted
 )

@@ -14,6 +14,7 @@ from push_model import se2
 from push_model.arrays import Array
 from push_model.jobs import JobError
 from push_model.occupancy import OccupancyGrid as Grid
+from push_model.push_segment import PushSegment
 from push_model.settings import SettingsError
 from push_msgs.action import MoveObject
 from push_ros.belief_feed import BeliefFeed, belief_of
@@ -29,7 +30,7 @@ from push_ros.qos import LATCHED, STREAM
 from push_ros.scheduling import Urgency
 from push_ros.validation import FRAME
 from push_scenario.scenario import Scenario, load_scenario
-from push_supervisor import commands, events, motions
+from push_supervisor import commands, events, repair
 from push_supervisor.arrival import Arrival, arrival
 from push_supervisor.blocked_way import BlockedWay
 from push_supervisor.commands import Command, Question
@@ -39,6 +40,7 @@ from push_supervisor.events import Event
 from push_supervisor.machine import Machine
 from push_supervisor.objects import Objects
 from push_supervisor.peers import Peers
+from push_supervisor.questions import Seen, ask
 from push_supervisor.requests import Moment, Peer, Request, Requests, Step
 from push_supervisor.settings import SupervisorSettings
 from push_supervisor.surroundings import Surroundings
@@ -77,7 +79,9 @@ class SupervisorNode(Node):
         gate = declare_settings(self, PoseGateSettings, poses, "poses", "supervisor.poses")
         self._objects = Objects(scenario, self.robot, self.object, lambda: self.settings)
         self.surroundings = self._objects.around(self.object, belief_of(scenario))
-        self.machine = Machine(self.settings, self._at_goal, lambda: self._touched() is not None)
+        asked = self._at_goal, lambda: self._touched() is not None
+        self.machine = Machine(self.settings, *asked, beginning=self._beginning)
+        self._repairs = 0  # number of plans that were asked for during a push
         self._requests = Requests(self.settings)
         self._ticks = 0
         self._displacement = Displacement(self.machine)
@@ -143,7 +147,7 @@ class SupervisorNode(Node):
 
     def take_goal(self, goal: Array, plan_only: bool) -> None:
         """See JobOwner."""
-        self._fire(events.GoalGiven(goal, plan_only))
+        self._fire(events.GoalGiven(goal, plan_only, self.object))
 
     def end_job(self, code: JobError, message: str) -> None:
         """See JobOwner."""
@@ -188,7 +192,8 @@ class SupervisorNode(Node):
     def _take_map(self, grid: Grid) -> None:
         if not self.surroundings.take_map(grid):
             return
-        self._fire(events.MapChanged(self.surroundings.blocked(self.machine.remaining)))
+        pushes = repair.to_come(self.machine, self._pose(self.object))
+        self._fire(events.MapChanged(self.surroundings.blocked(pushes)))
 
     def _on_scenario(self, message: String) -> None:
         """Another world: a job ends when its robot or its object is not what it was."""
@@ -213,7 +218,6 @@ class SupervisorNode(Node):
         seen = {n: p for n in (self.object, self.robot) if (p := self._pose(n)) is not None}
         self._intake.frame(self._poses.stamp, lambda: seen, self.ready and len(seen) == 2)
         if self._ticks % 2 == 0:
-            self._watch_displacement()
             self._watch_way()
             if self._intake.waited_for:
                 self._intake.feedback(self._feedback())
@@ -224,18 +228,17 @@ class SupervisorNode(Node):
         if self._poses.silence > 0.3:
             self._tend()
 
-    def _watch_displacement(self) -> None:
-        moved = self._displacement.look(self._pose(self.object))
-        if moved is not None:
-            self._fire(moved)
+    def _bodies(self) -> Array:
+        near = self.surroundings
+        return near.bodies({name: self._pose(name) for name in near.others})
 
     def _watch_way(self) -> None:
         near = self.surroundings
-        bodies = near.bodies({name: self._pose(name) for name in near.others})
         robot, item = self._pose(self.robot), self._pose(self.object)
-        blocked = self._blocked_way.look(near, robot, item, bodies)
-        if blocked is not None:
-            self._fire(blocked)
+        self._fire(self._displacement.look(item))
+        if self.machine.repairing and item is not None:
+            self._fire(repair.late(self.machine.segment, item))
+        self._fire(self._blocked_way.look(near, robot, item, self._bodies()))
 
     def _pose(self, name: str) -> Array | None:
         """The pose ``(3,)`` of a body, None when it is not known now."""
@@ -254,16 +257,27 @@ class SupervisorNode(Node):
     # The machine and its requests
 
     def _carry_out(self, command: Command) -> None:
-        if isinstance(command, (commands.Stop, commands.CancelPlan, commands.Finish)):
-            self._requests.drop()
-            self._peers.let_go()
-            if isinstance(command, commands.Finish):
-                self._finish(command.code, command.message)
-            return
-        waits = isinstance(command, (commands.MakePlan, commands.FindPath)) and command.later
-        delay = self.settings.wait if waits else 0.0
-        self._requests.begin(Request(command, delay), self._now())
-        self._tend()
+        match command:
+            case commands.Repair():
+                self._repairs += 1
+                self._ask(-self._repairs, command)
+            case commands.CancelRepair():
+                self._peers.stop_planning()
+            case commands.Stop() | commands.CancelPlan():
+                self._let_go()
+            case commands.Finish(code, message, going_on):
+                if not going_on:
+                    self._let_go()
+                self._finish(code, message)
+            case _:
+                waits = isinstance(command, commands.MakePlan | commands.FindPath) and command.later
+                delay = self.settings.wait if waits else 0.0
+                self._requests.begin(Request(command, delay), self._now())
+                self._tend()
+
+    def _let_go(self) -> None:
+        self._requests.drop()
+        self._peers.let_go()
 
     def _now(self) -> Moment:
         """The clocks and who is there."""
@@ -291,32 +305,25 @@ class SupervisorNode(Node):
         self._requests.sign(number, self._now())
 
     def _on_answer(self, number: int, event: Event) -> None:
-        if self._requests.answer(number):
+        if self._requests.answer(number) or (number == -self._repairs and self.machine.repairing):
             self._fire(event)
 
-    def _ask(self, number: int, command: Question) -> None:
+    def _ask(self, number: int, command: Question | commands.Repair) -> None:
         """Send what a command asks for; the poses are known."""
         robot, item = self._pose(self.robot), self._pose(self.object)
         assert robot is not None and item is not None
-        near, peers = self.surroundings, self._peers
-        bodies = {name: self._pose(name) for name in near.others}
-        heartbeat = self.settings.heartbeat_timeout
-        match command:
-            case commands.MakePlan(goal, preemptive):
-                stamp, others = self._poses.stamp, near.bodies(bodies)
-                peers.plan(number, item, goal, stamp, preemptive, others, robot)
-            case commands.FindPath(segment):
-                circles = near.on_the_way(item, bodies)
-                wait = motions.standoff(segment, item)
-                crowded = len(near.bodies(bodies)) > 0
-                peers.path(number, robot, wait, circles, crowded)
-            case commands.FollowPush(segment):
-                peers.push(number, segment, near.push(segment), heartbeat)
-            case commands.FollowRetreat() if (touched := self._touched()) is not None:
-                name, near, there = touched
-                peers.move(number, *near.retreat(robot, there), heartbeat, name)
-            case _:
-                peers.move(number, *near.motion(command, robot, item), heartbeat)
+        others = {name: self._pose(name) for name in self.surroundings.others}
+        stamp, lockstep = self._poses.stamp, self._poses.clock.lockstep
+        seen = Seen(self.surroundings, robot, item, others, stamp, lockstep, self._touched)
+        ask(self._peers, number, command, seen)
+
+    # A plan that is made while the robot pushes
+
+    def _beginning(self, segment: PushSegment) -> PushSegment | None:
+        item = self._pose(self.object)
+        if item is None or self._pose(self.robot) is None or not self._peers.ready(Peer.PLANNER):
+            return None
+        return repair.beginning(self.surroundings, segment, item, self._bodies())
 
     # Outputs
 

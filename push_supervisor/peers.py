@@ -20,6 +20,7 @@ from push_ros.conversions import (
     pose_stamped_to_ros,
     pose_to_ros,
     segment_from_ros,
+    segment_to_ros,
     trajectory_from_ros,
     trajectory_to_ros,
 )
@@ -80,8 +81,12 @@ class Peers:
 
     def let_go(self) -> None:
         """Cancel what the others are doing for this one."""
-        self._planner.forget()
+        self.stop_planning()
         self._controller.forget()
+
+    def stop_planning(self) -> None:
+        """Cancel the plan that is being made, if there is one."""
+        self._planner.forget()
 
     def plan(
         self,
@@ -92,9 +97,12 @@ class Peers:
         preemptive: bool,
         bodies: Array,
         robot: Array,
+        under_way: PushSegment | None = None,
+        budget: float = 0.0,
     ) -> None:
         """Ask for a plan. bodies: circles ``(n, 3)`` about others. stamp: [s] of the poses.
-        robot: ``(3,)`` its pose."""
+        robot: ``(3,)`` its pose. under_way: a push at whose end the plan is to begin. budget: [s]
+        of wall time, after which the best plan until then is the answer; 0 if there is time."""
         request = PlanPush.Goal(
             mode=PlanPush.Goal.PREEMPTIVE if preemptive else PlanPush.Goal.DIRECT,
             object=self.item,
@@ -103,6 +111,8 @@ class Peers:
             goal=pose_stamped_to_ros(goal, stamp),
             robot_pose=pose_stamped_to_ros(robot, stamp),
             obstacles=circles_to_ros(bodies),
+            time_budget=budget,
+            under_way=[] if under_way is None else [segment_to_ros(under_way)],
         )
 
         def failed(
@@ -172,8 +182,15 @@ class Peers:
         )
         self._follow(number, goal)
 
-    def push(self, number: int, segment: PushSegment, circles: Array, heartbeat: float) -> None:
-        """Have the robot push."""
+    def push(
+        self,
+        number: int,
+        segment: PushSegment,
+        circles: Array,
+        heartbeat: float,
+        going_on: bool = False,
+    ) -> None:
+        """Have the robot push. going_on: the push begins like the one under way."""
         goal = FollowTrajectory.Goal(
             mode=FollowTrajectory.Goal.PUSH,
             object=self.item,
@@ -183,6 +200,7 @@ class Peers:
             curvature_max=segment.limits.maximum,
             obstacles=circles_to_ros(circles),
             heartbeat_timeout=heartbeat,
+            going_on=going_on,
         )
         self._follow(number, goal)
 
@@ -198,4 +216,7 @@ class Peers:
             else:
                 self._answered(number, events.MotionFailed(result.error_msg))
 
-        self._controller.send(goal, done, lambda feedback: self._sign(number))
+        # A push that goes on must not be canceled, not even for a moment.
+        self._controller.send(
+            goal, done, lambda feedback: self._sign(number), cancel=not goal.going_on
+        )

@@ -84,6 +84,14 @@ class SupervisorSettings:
         doc="Maximum number of interruptions in a row by other bodies: waits until they clear the "
         "path of the robot, and new plans because they are on the path of a push.",
     )
+    repair_time: float = bounded(
+        1.0,
+        low=0.0,
+        high=60.0,
+        doc="Time that the robot goes on with a push while a new plan is made, when the goal has "
+        "moved or a later part of the plan is blocked (s). Without a plan by then it backs off "
+        "and waits for one. Below 0.5 it always backs off first.",
+    )
     wait: float = bounded(
         3.0,
         low=0.1,

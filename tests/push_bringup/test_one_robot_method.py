@@ -256,3 +256,36 @@ def test_teams_and_settings_that_do_not_suit_are_refused_in_words():
         OneRobotMethod(replace(book.arena, settings={"": SupervisorSettings(auto_execute=False)}))
     with pytest.raises(SettingsError, match="push_speed"):
         ONE_ROBOT.settings({"planner": {"push_speed": 99.0}})
+
+
+def moved_goal(seed, **settings):
+    """A goal that moves at random in mid-push: the notebook at the end, and the reasons told."""
+    random = np.random.default_rng(seed)
+    book = Notebook("short", **settings)
+    book.goal = np.array([*random.uniform([0.1, -0.4], [0.7, 0.4]), random.uniform(-0.8, 0.8)])
+    book.pushing(random.uniform(0.2, 6.0))
+    if book.method.status.phase != JobPhase.PUSHING:
+        return book, []
+    book.goal = np.array([*random.uniform([-0.5, -0.4], [0.8, 0.4]), random.uniform(-1.2, 1.2)])
+    reasons = []
+    book.begin()
+    book.step()
+    while book.method.status.phase != JobPhase.IDLE:
+        if not reasons or reasons[-1] != book.method.status.reason:
+            reasons.append(book.method.status.reason)
+        book.step()
+    return book, reasons
+
+
+def test_a_goal_that_moves_in_mid_push_is_planned_for_while_the_robot_pushes():
+    repaired = 0
+    for seed in range(8):
+        book, reasons = moved_goal(seed)
+        if not reasons:  # the push had ended before
+            continue
+        assert book.method.status.code == 0, book.method.status.reason
+        assert book.away < 4.5e-3
+        if reasons[0].startswith("pushing on meanwhile"):
+            assert reasons[1].startswith("push 1 of") or "not ready in time" in reasons[1]
+            repaired += reasons[1].startswith("push 1 of")
+    assert repaired >= 5

@@ -131,3 +131,17 @@ def test_many_twists_are_limited_like_one():
             else:
                 v, omega = drive.saturate(told[0], told[2])
                 assert limited.tolist() == [v, 0.0, omega]
+
+
+@given(st.floats(0.0, 1.0), st.floats(0.0, 1.0))
+def test_a_part_of_a_trajectory_is_the_whole_between_two_times(first, second):
+    further = line(np.array([0.5, 0.0, 0.0]), 0.3, 0.1, 1.0)
+    whole = concatenate([line(np.zeros(3), 0.5, 0.1, 0.2), further])
+    begin, end = sorted((first * whole.duration, second * whole.duration))
+    part = whole.between(begin, end)
+    assert part.duration >= 1e-3 - 1e-9 and part.duration == pytest.approx(end - begin, abs=2e-3)
+    t = np.linspace(0.0, part.duration, 20)
+    shift = min(begin, whole.duration - 1e-3)
+    for got, expected in zip(part.sample(t), whole.sample(shift + t), strict=True):
+        assert got == pytest.approx(expected, abs=1e-9)
+    assert part.length == pytest.approx(part.pose[-1, 0] - part.pose[0, 0])

@@ -347,3 +347,26 @@ print(times[0] / np.median(times))
     )
     ratio = float(done.stdout.split()[-1])
     assert ratio < 20 if warm else ratio > 20
+
+
+@pytest.mark.parametrize("seconds", [0.1, 0.7, 2.3, 4.0, 5.5])
+def test_a_push_goes_on_with_another_trajectory_that_begins_like_it(seconds):
+    """As if it had been that one from the beginning: the reference goes on from where it is."""
+    alone, moved = make(), make()
+    alone.start(task(0.8))
+    moved.start(task(0.5))
+    *_, (_, at) = drive(alone, np.zeros(3), seconds)
+    *_, (_, robot) = drive(moved, np.zeros(3), seconds)
+    assert robot == pytest.approx(at, abs=1e-4)
+    moved.start(task(0.8), going_on=True)
+    ticks = zip(drive(alone, at, 30), drive(moved, robot, 30), strict=False)
+    for (first, at), (second, robot) in ticks:
+        assert robot == pytest.approx(at, abs=1e-3)
+        assert second.v == pytest.approx(first.v, abs=2e-3)
+    assert second.finished and second.code is TrackError.NONE
+
+
+def test_there_must_be_a_push_to_go_on_with():
+    tracker = make()
+    with pytest.raises(RuntimeError, match="no task"):
+        tracker.start(task(), going_on=True)

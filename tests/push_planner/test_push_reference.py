@@ -8,7 +8,7 @@ import pytest
 from push_model import se2
 from push_model.occupancy import rasterise
 from push_model.specs import EnvironmentSpec
-from push_planner import PlannerSettings, PushPlanner, joined
+from push_planner import PlannerSettings, PushPlanner, going_on, joined
 from push_planner.push_curve import shortest_push_curve
 from push_planner.push_graph import PushStep
 
@@ -21,10 +21,12 @@ def planner(robot, box):
 
 
 def push(planner, number, start, end, clearance=0.3):
-    """A push on a side from one pose of the robot to another."""
+    """A push on a side from one pose of the robot to another, None if there is none."""
     side = planner.scene.sides[number]
     trusted = side.trusted
     curve = shortest_push_curve(start, end, trusted.minimum, trusted.maximum)
+    if curve is None:
+        return None
     at, to = (se2.compose(pose, side.grasp) for pose in (start, end))
     return planner.segment(
         PushStep(side, curve, at, to, clearance, planner.scene.time.of_push(curve))
@@ -74,3 +76,52 @@ def test_a_single_push_keeps_its_reference(planner, robot):
         [push(planner, 0, BEGIN, MIDDLE), push(planner, 0, MIDDLE, END)], robot.drive, slow
     )
     assert again[0].trajectory.twist[:, 0].max() == pytest.approx(0.05)
+
+
+def cut_and_went_on(planner, robot, side, seed):
+    """A random push, where it is cut off [s], and it with another push on a side from there."""
+    rng = np.random.default_rng(seed)
+    while True:
+        target = np.array([*rng.uniform([0.2, -0.4], [1.0, 0.4]), rng.uniform(-0.6, 0.6)])
+        start = np.array([*rng.uniform(-1.0, 1.0, 2), rng.uniform(-np.pi, np.pi)])
+        old = push(planner, 0, start, se2.compose(start, target))
+        if old is None:
+            continue
+        at = rng.uniform(0.3, 1.0) * old.trajectory.duration
+        begun = old.part(0.0, at)
+        further = np.array([*rng.uniform([0.2, -0.3], [0.8, 0.3]), rng.uniform(-0.5, 0.5)])
+        new = push(planner, side, begun.robot_end, se2.compose(begun.robot_end, further))
+        if new is not None:
+            return old, at, new, going_on(begun, [new], robot.drive, SETTINGS)
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_a_push_under_way_goes_on_with_a_new_one_on_its_side(planner, robot, seed):
+    old, at, new, (whole,) = cut_and_went_on(planner, robot, 0, seed)
+    t = whole.trajectory
+    assert np.array_equal(whole.object_end, new.object_end)
+    assert whole.grasp == pytest.approx(old.grasp)
+    way = float(np.interp(at, old.trajectory.time, old.trajectory.travelled))
+    assert t.length == pytest.approx(way + new.trajectory.length, abs=1e-3)
+    for part in np.linspace(0.0, way, 30):  # the same path up to there
+        was, _ = old.trajectory.sample(
+            np.interp([part], old.trajectory.travelled, old.trajectory.time)
+        )
+        now, _ = t.sample(np.interp([part], t.travelled, t.time))
+        assert np.hypot(*(now - was)[0, :2]) < 1e-3 and abs((now - was)[0, 2]) < 5e-3
+    v, omega = t.twist.T
+    wheel = np.abs(v) + robot.drive.half_track * np.abs(omega)
+    assert wheel.max() <= (1.0 - SETTINGS.wheel_reserve) * robot.drive.max_speed + 1e-9
+    inner = (t.travelled > 0.02) & (t.travelled < t.length - 0.02)
+    assert v[inner].min() > 0.03, "it does not stop between"
+    rise = np.diff(v**2) / (2.0 * np.maximum(np.diff(t.travelled), 1e-9))
+    assert np.abs(rise).max() <= SETTINGS.push_acceleration * 1.05
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_push_under_way_comes_to_rest_before_a_change_of_the_side(planner, robot, seed):
+    old, at, new, (head, after) = cut_and_went_on(planner, robot, 1, seed)
+    assert after is new and head.side == 0
+    end, _ = old.trajectory.sample(np.array([at]))
+    assert head.trajectory.pose[-1] == pytest.approx(end[0]) and head.trajectory.twist[-1, 0] == 0.0
+    assert head.object_end == pytest.approx(se2.compose(end[0], old.grasp))

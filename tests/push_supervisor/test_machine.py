@@ -18,6 +18,7 @@ from push_supervisor.commands import (
     FollowRetreat,
     FollowTurn,
     MakePlan,
+    Repair,
     Stop,
 )
 from push_supervisor.events import (
@@ -25,6 +26,7 @@ from push_supervisor.events import (
     ClockReset,
     ExecuteCommanded,
     GoalGiven,
+    JobAborted,
     MapChanged,
     MotionDone,
     MotionFailed,
@@ -33,6 +35,7 @@ from push_supervisor.events import (
     PathFound,
     PlanFailed,
     PlanFound,
+    RepairLate,
     WayBlocked,
 )
 
@@ -41,12 +44,13 @@ def segment(side, turns=False):
     return SimpleNamespace(side=side, object_end=f"end of {side}", turns=turns)
 
 
-def make(there=False, touching=False, close=True, **changes):
-    answer = {"there": there, "touching": touching, "close": close}
+def make(there=False, touching=False, close=True, free=False, **changes):
+    answer = {"there": there, "touching": touching, "close": close, "free": free}
     machine = Machine(
         SupervisorSettings(**changes),
         lambda goal: Arrival(answer["there"], answer["close"], "error"),
         lambda: answer["touching"],
+        beginning=lambda push: push if answer["free"] else None,
     )
     return machine, answer
 
@@ -549,6 +553,8 @@ ANY = st.sampled_from(
         MapChanged("p"),
         WayBlocked("p"),
         MapChanged(),
+        RepairLate(),
+        JobAborted(JobError.PREEMPTED, "m"),
         ClockReset(),
     ]
 )
@@ -561,17 +567,22 @@ MOTIONS = {
 }
 
 
-@given(st.lists(ANY, max_size=60), st.booleans(), st.booleans(), st.booleans(), st.booleans())
-def test_invariants_of_any_walk(events, automatic, there, touching, close):
-    machine, _ = make(there, touching, close, auto_execute=automatic)
-    allowed = automatic
+@given(st.lists(ANY, max_size=60), *[st.booleans()] * 5)
+def test_invariants_of_any_walk(events, automatic, there, touching, close, free):
+    machine, _ = make(there, touching, close, free, auto_execute=automatic)
+    allowed, left = automatic, False
     for event in events:
         before = machine.state
         allowed = automatic or (
             isinstance(event, ExecuteCommanded) if machine.plan_ready else allowed and machine.busy
         )
-        out = commands(machine.handle(event))
+        told = machine.handle(event)
+        out = commands(told)
         assert sum(c in MOTIONS for c in out) <= 1
+        assert not left or Stop in out or Repair in out  # a push that went on for a new goal
+        left = any(isinstance(c, Finish) and c.going_on for c in told)
+        assert not left or before is State.PUSHING
+        assert machine.state is State.PUSHING or not machine.repairing
         if MOTIONS & set(out):
             assert machine.state not in (State.IDLE, State.PLANNING)
             assert allowed  # nothing moves a robot before it may
@@ -579,7 +590,7 @@ def test_invariants_of_any_walk(events, automatic, there, touching, close):
             assert machine.index < len(machine.segments)
         if machine.state is State.IDLE and before not in (State.IDLE, State.PLANNING):
             # nothing moves a robot after a job has ended
-            assert Stop in out or before is State.DETACHING
+            assert Stop in out or before is State.DETACHING or left
             assert Finish in out
         if Finish in out and machine.state is State.IDLE:
             assert not machine.busy and machine.segments == []

@@ -1,0 +1,77 @@
+"""Where a new plan can begin while the robot pushes."""
+
+import numpy as np
+
+from push_model import se2
+from push_model.arrays import Array
+from push_model.push_segment import PushSegment
+from push_supervisor.blocked_way import obstruction
+from push_supervisor.events import RepairLate
+from push_supervisor.machine import Machine
+from push_supervisor.state import State
+from push_supervisor.surroundings import Surroundings
+
+_LEAST = 0.5  # [s] of push: for less, planning does not begin
+_LATE = 0.25  # [s] before the place, at which a plan comes too late: poses are late too
+_QUICK = 0.1  # [s] for a plan, at least, and between its end and the time at which it is late
+_TURN = 0.1  # [m/rad] that an angle of the object counts
+
+
+def reached(segment: PushSegment, item: Array) -> float:
+    """[s] along the trajectory of a push that the object at a pose ``(3,)`` has come."""
+    poses = segment.object_poses
+    turned = (poses[:, 2] - item[2] + np.pi) % (2.0 * np.pi) - np.pi
+    off = np.hypot(*(poses[:, :2] - item[:2]).T) + _TURN * np.abs(turned)
+    return float(segment.trajectory.time[int(np.argmin(off))])
+
+
+def beginning(
+    near: Surroundings, segment: PushSegment, item: Array, bodies: Array
+) -> PushSegment | None:
+    """A push under way, up to where it will be after ``repair_time``, or up to its end; None if
+    that is not free, or too soon.
+
+    Parameters
+    ----------
+    item: ``(3,)`` pose of the object now.
+    bodies: ``(n, 3)`` [m] x, y, radius of others.
+    """
+    now = reached(segment, item)
+    end = min(now + near.settings.repair_time, segment.trajectory.duration)
+    if end - now < _LEAST:
+        return None
+    ahead = segment.part(now, end)
+    if near.blocked([ahead]) or obstruction([ahead], near.outlines, bodies, item) is not None:
+        return None
+    return segment.part(0.0, end)
+
+
+def budget(beginning: PushSegment, item: Array) -> float:
+    """[s] for a plan that begins at the end of a push, with the object at a pose ``(3,)`` now."""
+    left = beginning.trajectory.duration - reached(beginning, item)
+    return max(_QUICK, left - _LATE - _QUICK)
+
+
+def robot(near: Surroundings, beginning: PushSegment) -> Array:
+    """Pose ``(3,)`` of the robot from which its way to another side begins: backed off."""
+    back = np.array([-near.settings.detach_distance, 0.0, 0.0])
+    behind: Array = se2.compose(beginning.robot_end, back)
+    return behind
+
+
+def to_come(machine: Machine, item: Array | None) -> list[PushSegment]:
+    """The pushes that are not done yet; of the one under way, only what lies ahead of the object.
+
+    item: ``(3,)`` its pose, None if unknown.
+    """
+    pushes = machine.remaining
+    if machine.state is not State.PUSHING or item is None or pushes[0].turns:
+        return pushes
+    now, end = reached(pushes[0], item), pushes[0].trajectory.duration
+    return [pushes[0].part(now, end), *pushes[1:]]
+
+
+def late(beginning: PushSegment, item: Array) -> RepairLate | None:
+    """Whether a plan that begins at the end of a push would come too late now."""
+    came = reached(beginning, item) > beginning.trajectory.duration - _LATE
+    return RepairLate() if came else None
