@@ -162,11 +162,11 @@ class OneRobotMethod:
         if event is not None:
             self._fire(event)
 
-    def _beginning(self, push: PushSegment) -> PushSegment | None:
+    def _beginning(self, push: PushSegment, goal: Array | None) -> PushSegment | None:
         seen = self._seen
         if seen is None or self._name not in seen.robots:
             return None
-        return repair.beginning(self._near, push, seen.object, seen.obstacles)
+        return repair.beginning(self._near, push, seen.object, seen.obstacles, goal)
 
     def _carry_out(self, command: Command) -> None:
         self._question = self._repair = None

@@ -9,6 +9,7 @@ from push_job.method import Seen
 from push_model.arrays import Array
 from push_model.distance_field import DistanceField
 from push_model.jobs import JobError
+from push_model.push_segment import PushSegment
 from push_model.specs import ObjectSpec, RobotSpec
 from push_model.stick_certificate import ContactBelief
 from push_planner import (
@@ -41,6 +42,7 @@ class Plans:
         self._draws = 0  # pre-emptive pushes asked for: each draws others
         self._planner: PushPlanner | None = None
         self._work: Iterator[Progress] | None = None
+        self._best: PushPlan | None = None
         self._specs: tuple[RobotSpec, ObjectSpec, ContactBelief | None] = robot, item, None
         try:
             warm_up(settings, robot, item)
@@ -77,10 +79,14 @@ class Plans:
         """Do one slice of the work on a plan that begins with the push under way."""
         push = command.segment
         then, robot = replace(seen, object=push.object_end), repair.robot(near, push)
+        before = self._best if self._work is not None else None
         event = self.plan(commands.MakePlan(command.goal), robot, then, push.side)
+        if event is None and self._best is not None and self._best is not before:
+            event = events.PlanFound(self._pushes(self._best), improving=True)
         if isinstance(event, events.PlanFound):
             drive = self._specs[0].differential
-            event = events.PlanFound(going_on(push, event.segments, drive, self._settings))
+            pushes = going_on(push, event.segments, drive, self._settings)
+            event = events.PlanFound(pushes, event.improving)
         return event
 
     def plan(
@@ -89,15 +95,14 @@ class Plans:
         """Do one slice of the work on a plan; the plan, or why there is none, after the last."""
         if self._work is None:
             self._draws += command.preemptive
-            self._best: PushPlan | None = None
+            self._best = None
             self._work = self._begin(command, seen, robot, on_side)
         try:
             self._best = next(self._work).best
             return None
         except StopIteration:
             assert self._best is not None
-            pushes = joined(self._best.segments, self._specs[0].differential, self._settings)
-            answer: events.Event = events.PlanFound(pushes)
+            answer: events.Event = events.PlanFound(self._pushes(self._best))
         except TooHeavy as error:
             answer = events.PlanFailed(JobError.TOO_HEAVY, str(error))
         except PlanningFailed as failure:
@@ -106,6 +111,9 @@ class Plans:
             answer = events.PlanFailed(job_error(failure), str(failure), retry, crowded)
         self._work = None
         return answer
+
+    def _pushes(self, plan: PushPlan) -> tuple[PushSegment, ...]:
+        return joined(plan.segments, self._specs[0].differential, self._settings)
 
     def _begin(
         self, command: commands.MakePlan, seen: Seen, robot: Array, on_side: int | None

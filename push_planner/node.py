@@ -258,9 +258,9 @@ class PlannerNode(Node):
         if improved or elapsed - self._told > _SIGN_OF_LIFE:
             self._told = elapsed
             cost = math.inf if self._best is None else self._best.cost
-            self._server.feedback(
-                PlanPush.Feedback(elapsed=elapsed, best_cost=cost, stage=progress.stage)
-            )
+            told = PlanPush.Feedback(elapsed=elapsed, best_cost=cost, stage=progress.stage)
+            told.plan = [self._plan_message] if improved and self._best and self._under_way else []
+            self._server.feedback(told)
         if self._best is not None and 0.0 < self._request.time_budget < elapsed:
             self._succeed()
             return

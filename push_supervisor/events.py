@@ -30,9 +30,10 @@ class CancelCommanded:
 
 @dataclass(frozen=True)
 class PlanFound:
-    """segments: the pushes, in order."""
+    """segments: the pushes, in order. improving: whether the planner goes on to improve it."""
 
     segments: tuple[PushSegment, ...]
+    improving: bool = False
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ class WayBlocked:
 
 @dataclass(frozen=True)
 class RepairLate:
-    """The robot has come to where a new plan was to begin, and there is none yet."""
+    """The robot comes to where a new plan is to begin, and it is not complete yet."""
 
 
 @dataclass(frozen=True)

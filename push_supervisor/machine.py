@@ -12,6 +12,7 @@ made from there.
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from push_model.arrays import Array
 from push_model.jobs import JobError
 from push_model.push_segment import PushSegment
 from push_supervisor import commands, events
@@ -29,10 +30,10 @@ class Machine(Course):
     """Takes events, one job at a time.
 
     beginning: of a push under way, up to where a new plan can begin; None if there is no room or no
-    time to go on with it.
+    time to go on with it, or if it does not bring the object nearer to a goal, if one is given.
     """
 
-    beginning: Callable[[PushSegment], PushSegment | None] = lambda segment: None
+    beginning: Callable[[PushSegment, Array | None], PushSegment | None] = lambda push, goal: None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -40,6 +41,7 @@ class Machine(Course):
         self._left: PushSegment | None = None  # push of a replaced job, which goes on
         self._repair: PushSegment | None = None  # push that goes on while a plan is made
         self._blocked = False  # whether the plan is repaired because it is blocked
+        self._found: list[PushSegment] = []  # the plan so far, while it is still improved
 
     @property
     def repairing(self) -> bool:
@@ -78,18 +80,22 @@ class Machine(Course):
                 self._on_others(event.message)
             case events.ExecuteCommanded() if state is State.IDLE:
                 self._on_execute()
+            case events.PlanFound(improving=True):
+                self._found = list(event.segments) if self.repairing else []
             case events.PlanFound() if state is State.PLANNING:
                 self._on_plan(event)
             case events.PlanFailed() if state is State.PLANNING:
                 self._on_plan_failed(event)
             case events.PlanFound() if self.repairing:
-                self._on_repaired(event)
+                self._on_repaired(list(event.segments))
             case events.PlanFailed() if self.repairing:
                 self._retreat(event.message)
             case events.PathFound() if state is State.POSITIONING:
                 self._on_path(event)
             case events.PathFailed() if state is State.POSITIONING:
                 self._on_path_failed(event)
+            case events.RepairLate() if self.repairing and self._found:
+                self._on_repaired(self._found)
             case events.MotionDone() | events.RepairLate() if self.repairing:
                 self._retreat(_LATE)
             case events.MotionDone() if state in MOVING:
@@ -109,29 +115,30 @@ class Machine(Course):
         self._tried = Attempts(self.settings)
         same, self._item = event.item == self._item, event.item
         why = "planning for a new goal"
-        if left is not None and same and self._go_on(left, why):
+        if left is not None and same and self._go_on(left, why, event.goal):
             return
         if left is not None:
             self._say(commands.Stop())
         self._plan(why)
 
-    def _go_on(self, push: PushSegment, why: str) -> bool:
-        """Go on with a push while a new plan is made, if that is possible."""
+    def _go_on(self, push: PushSegment, why: str, nearer: Array | None = None) -> bool:
+        """Go on with a push while a new plan is made, if that is possible, and if it brings the
+        object nearer to a goal, if one is given."""
         if push.turns or not self._execute or self.at_goal(self.goal).there:
             return False
-        beginning = self.beginning(push)
+        beginning = self.beginning(push, nearer)
         if beginning is None:
             return False
         assert self.goal is not None
-        self._repair, self._blocked = push, False
+        self._repair, self._blocked, self._found = push, False, []
         self.segments, self.index = [beginning], 0
         self._enter(State.PUSHING, f"pushing on meanwhile; {why}")
         self._say(commands.Repair(self.goal, beginning))
         return True
 
-    def _on_repaired(self, event: events.PlanFound) -> None:
+    def _on_repaired(self, plan: list[PushSegment]) -> None:
         """The plan begins with the push under way."""
-        self.segments, self.index, self._repair = list(event.segments), 0, None
+        self.segments, self.index, self._repair = plan, 0, None
         if self._blocked:
             self.replans += 1
             self._tried.setbacks += 1

@@ -313,17 +313,16 @@ class SupervisorNode(Node):
         robot, item = self._pose(self.robot), self._pose(self.object)
         assert robot is not None and item is not None
         others = {name: self._pose(name) for name in self.surroundings.others}
-        stamp, lockstep = self._poses.stamp, self._poses.clock.lockstep
-        seen = Seen(self.surroundings, robot, item, others, stamp, lockstep, self._touched)
+        seen = Seen(self.surroundings, robot, item, others, self._poses.stamp, self._touched)
         ask(self._peers, number, command, seen)
 
     # A plan that is made while the robot pushes
 
-    def _beginning(self, segment: PushSegment) -> PushSegment | None:
+    def _beginning(self, segment: PushSegment, goal: Array | None) -> PushSegment | None:
         item = self._pose(self.object)
         if item is None or self._pose(self.robot) is None or not self._peers.ready(Peer.PLANNER):
             return None
-        return repair.beginning(self.surroundings, segment, item, self._bodies())
+        return repair.beginning(self.surroundings, segment, item, self._bodies(), goal)
 
     # Outputs
 

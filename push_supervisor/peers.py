@@ -98,11 +98,10 @@ class Peers:
         bodies: Array,
         robot: Array,
         under_way: PushSegment | None = None,
-        budget: float = 0.0,
     ) -> None:
         """Ask for a plan. bodies: circles ``(n, 3)`` about others. stamp: [s] of the poses.
-        robot: ``(3,)`` its pose. under_way: a push at whose end the plan is to begin. budget: [s]
-        of wall time, after which the best plan until then is the answer; 0 if there is time."""
+        robot: ``(3,)`` its pose. under_way: a push at whose end the plan is to begin; then plans
+        that are still being improved are told, too."""
         request = PlanPush.Goal(
             mode=PlanPush.Goal.PREEMPTIVE if preemptive else PlanPush.Goal.DIRECT,
             object=self.item,
@@ -111,7 +110,6 @@ class Peers:
             goal=pose_stamped_to_ros(goal, stamp),
             robot_pose=pose_stamped_to_ros(robot, stamp),
             obstacles=circles_to_ros(bodies),
-            time_budget=budget,
             under_way=[] if under_way is None else [segment_to_ros(under_way)],
         )
 
@@ -133,14 +131,22 @@ class Peers:
                     crowded=len(bodies) > 0 and error in _ONLY_A_BODY_MATTERS,
                 )
                 return
+            found(result.plan)
+
+        def found(plan: Any, improving: bool = False) -> None:
             try:
-                segments = tuple(segment_from_ros(s) for s in result.plan.segments)
+                segments = tuple(segment_from_ros(s) for s in plan.segments)
             except InvalidMessage as problem:
                 failed(JobError.PLANNING_FAILED, f"the plan is not valid: {problem}")
                 return
-            self._answered(number, events.PlanFound(segments))
+            self._answered(number, events.PlanFound(segments, improving))
 
-        self._planner.send(request, done, lambda feedback: self._sign(number))
+        def working(feedback: Any) -> None:
+            self._sign(number)
+            for plan in feedback.plan:
+                found(plan, improving=True)
+
+        self._planner.send(request, done, working)
 
     def path(self, number: int, start: Array, goal: Array, circles: Array, crowded: bool) -> None:
         """Ask for a way of the robot alone. crowded: whether others are among the circles."""

@@ -16,8 +16,8 @@ class Seen:
     """What is known when a question is asked.
 
     robot, item: poses ``(3,)``. others: of the other bodies by name, None if unknown. stamp: [s] of
-    the poses. lockstep: whether the world waits, so that wall time says nothing. touched: tells
-    which object the robot may be touching, what stands around that one, and its pose.
+    the poses. touched: tells which object the robot may be touching, what stands around that one,
+    and its pose.
     """
 
     near: Surroundings
@@ -25,7 +25,6 @@ class Seen:
     item: Array
     others: Mapping[str, Array | None]
     stamp: float
-    lockstep: bool
     touched: Touched
 
     @property
@@ -45,8 +44,7 @@ def ask(
             peers.plan(number, item, goal, seen.stamp, preemptive, seen.bodies, robot)
         case commands.Repair(goal, push):
             then = push.object_end, goal, seen.stamp, False, seen.bodies, repair.robot(near, push)
-            budget = 0.0 if seen.lockstep else repair.budget(push, item)
-            peers.plan(number, *then, under_way=push, budget=budget)
+            peers.plan(number, *then, under_way=push)
         case commands.FindPath(segment):
             circles = near.on_the_way(item, seen.others)
             wait = motions.standoff(segment, item)

@@ -11,9 +11,8 @@ from push_supervisor.machine import Machine
 from push_supervisor.state import State
 from push_supervisor.surroundings import Surroundings
 
-_LEAST = 0.5  # [s] of push: for less, planning does not begin
-_LATE = 0.25  # [s] before the place, at which a plan comes too late: poses are late too
-_QUICK = 0.1  # [s] for a plan, at least, and between its end and the time at which it is late
+_LEAST = 0.7  # [s] of push: for less, planning does not begin
+_LATE = 0.5  # [s] before the place, at which a plan is needed: to brake there, with late poses
 _TURN = 0.1  # [m/rad] that an angle of the object counts
 
 
@@ -25,31 +24,36 @@ def reached(segment: PushSegment, item: Array) -> float:
     return float(segment.trajectory.time[int(np.argmin(off))])
 
 
+def _away(pose: Array, goal: Array) -> float:
+    return float(np.hypot(*(pose - goal)[:2]))
+
+
 def beginning(
-    near: Surroundings, segment: PushSegment, item: Array, bodies: Array
+    near: Surroundings,
+    segment: PushSegment,
+    item: Array,
+    bodies: Array,
+    goal: Array | None = None,
 ) -> PushSegment | None:
     """A push under way, up to where it will be after ``repair_time``, or up to its end; None if
-    that is not free, or too soon.
+    that is not free, or too soon, or not nearer to a goal.
 
     Parameters
     ----------
     item: ``(3,)`` pose of the object now.
     bodies: ``(n, 3)`` [m] x, y, radius of others.
+    goal: ``(3,)`` to which the object is to come nearer; None if it does not matter.
     """
     now = reached(segment, item)
     end = min(now + near.settings.repair_time, segment.trajectory.duration)
     if end - now < _LEAST:
         return None
     ahead = segment.part(now, end)
+    if goal is not None and _away(ahead.object_end, goal) > _away(item, goal):
+        return None
     if near.blocked([ahead]) or obstruction([ahead], near.outlines, bodies, item) is not None:
         return None
     return segment.part(0.0, end)
-
-
-def budget(beginning: PushSegment, item: Array) -> float:
-    """[s] for a plan that begins at the end of a push, with the object at a pose ``(3,)`` now."""
-    left = beginning.trajectory.duration - reached(beginning, item)
-    return max(_QUICK, left - _LATE - _QUICK)
 
 
 def robot(near: Surroundings, beginning: PushSegment) -> Array:
@@ -72,6 +76,6 @@ def to_come(machine: Machine, item: Array | None) -> list[PushSegment]:
 
 
 def late(beginning: PushSegment, item: Array) -> RepairLate | None:
-    """Whether a plan that begins at the end of a push would come too late now."""
+    """Whether a plan that begins at the end of a push is needed now."""
     came = reached(beginning, item) > beginning.trajectory.duration - _LATE
     return RepairLate() if came else None

@@ -90,7 +90,7 @@ class SupervisorSettings:
         high=60.0,
         doc="Time that the robot goes on with a push while a new plan is made, when the goal has "
         "moved or a later part of the plan is blocked (s). Without a plan by then it backs off "
-        "and waits for one. Below 0.5 it always backs off first.",
+        "and waits for one. Below 0.7 it always backs off first.",
     )
     wait: float = bounded(
         3.0,

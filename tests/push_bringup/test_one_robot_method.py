@@ -258,15 +258,20 @@ def test_teams_and_settings_that_do_not_suit_are_refused_in_words():
         ONE_ROBOT.settings({"planner": {"push_speed": 99.0}})
 
 
-def moved_goal(seed, **settings):
-    """A goal that moves at random in mid-push: the notebook at the end, and the reasons told."""
+def moved_goal(seed, supervisor=None, near=math.inf):
+    """A goal that moves at random in mid-push, at most so far [m]: the notebook at the end, and the
+    reasons told."""
     random = np.random.default_rng(seed)
-    book = Notebook("short", **settings)
+    book = Notebook("short", **{"": supervisor or SupervisorSettings()})
     book.goal = np.array([*random.uniform([0.1, -0.4], [0.7, 0.4]), random.uniform(-0.8, 0.8)])
     book.pushing(random.uniform(0.2, 6.0))
     if book.method.status.phase != JobPhase.PUSHING:
         return book, []
-    book.goal = np.array([*random.uniform([-0.5, -0.4], [0.8, 0.4]), random.uniform(-1.2, 1.2)])
+    was = book.goal
+    while True:
+        book.goal = np.array([*random.uniform([-0.5, -0.4], [0.8, 0.4]), random.uniform(-1.2, 1.2)])
+        if np.hypot(*(book.goal - was)[:2]) < near and abs(book.goal - was)[2] < 2.0 * near:
+            break
     reasons = []
     book.begin()
     book.step()

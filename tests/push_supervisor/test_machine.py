@@ -50,7 +50,7 @@ def make(there=False, touching=False, close=True, free=False, **changes):
         SupervisorSettings(**changes),
         lambda goal: Arrival(answer["there"], answer["close"], "error"),
         lambda: answer["touching"],
-        beginning=lambda push: push if answer["free"] else None,
+        beginning=lambda push, goal: push if answer["free"] else None,
     )
     return machine, answer
 
@@ -554,6 +554,7 @@ ANY = st.sampled_from(
         WayBlocked("p"),
         MapChanged(),
         RepairLate(),
+        PlanFound((segment(2),), improving=True),
         JobAborted(JobError.PREEMPTED, "m"),
         ClockReset(),
     ]

@@ -23,6 +23,7 @@ from push_supervisor.events import (
     MotionFailed,
     PathFound,
     PlanFailed,
+    PlanFound,
     RepairLate,
     WayBlocked,
 )
@@ -38,7 +39,7 @@ def pushing(free=True, there=False, **changes):
         SupervisorSettings(**changes),
         lambda goal: Arrival(there, there, "error"),
         lambda: True,
-        beginning=lambda push: BEGINNING if free else None,
+        beginning=lambda push, goal: BEGINNING if free else None,
     )
     walk(machine, GoalGiven("g", item="box"), MotionDone(), planned(0, 1, 2))
     walk(machine, PathFound("t"), MotionDone(), MotionDone())
@@ -135,6 +136,22 @@ def test_without_a_plan_in_time_the_robot_backs_off_and_plans(event):
     assert machine.replans == 1
 
 
+def test_a_plan_that_is_still_improved_is_taken_when_the_time_is_up():
+    machine = pushing()
+    machine.handle(WayBlocked("problem"))
+    for sides in ((4, 5), (6,)):
+        assert machine.handle(PlanFound(planned(*sides).segments, improving=True)) == []
+    out = machine.handle(RepairLate())
+    assert commands(out) == [CancelRepair, FollowPush] and out[1].going_on
+    assert [push.side for push in machine.segments] == [6] and machine.replans == 1
+    machine.handle(WayBlocked("problem"))  # what was found then does not count any more
+    assert commands(machine.handle(RepairLate())) == [CancelRepair, FollowRetreat]
+    assert machine.handle(PlanFound(planned(7).segments, improving=True)) == []
+    machine.handle(MotionDone())
+    assert machine.handle(PlanFound(planned(7).segments, improving=True)) == []
+    assert machine.state is State.PLANNING
+
+
 @pytest.mark.parametrize("event", [CancelCommanded(), ClockReset()])
 def test_a_job_that_ends_during_a_repair_stops_the_robot(event):
     machine = pushing()
@@ -149,9 +166,9 @@ def test_another_goal_during_a_repair_is_planned_for_from_the_same_push():
     whole = machine._repair
     assert commands(machine.handle(PREEMPTED)) == [CancelRepair, Finish]
     seen = []
-    machine.beginning = lambda push: seen.append(push) or BEGINNING
+    machine.beginning = lambda push, goal: seen.append((push, goal)) or BEGINNING
     assert machine.handle(GoalGiven("h", item="box")) == [Repair("h", BEGINNING)]
-    assert seen == [whole]
+    assert seen == [(whole, "h")]
 
 
 def test_repairs_are_bounded_like_other_new_plans():
