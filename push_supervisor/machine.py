@@ -22,6 +22,7 @@ from push_supervisor.course import Course
 from push_supervisor.events import Event
 from push_supervisor.state import MOVING, State
 
+_LONGER = 1e-6  # [m]
 _LATE = "the new plan was not ready in time"
 
 
@@ -94,7 +95,7 @@ class Machine(Course):
                 self._on_path(event)
             case events.PathFailed() if state is State.POSITIONING:
                 self._on_path_failed(event)
-            case events.RepairLate() if self.repairing and self._found:
+            case events.RepairLate() if self.repairing and self._begins_here(self._found):
                 self._on_repaired(self._found)
             case events.MotionDone() | events.RepairLate() if self.repairing:
                 self._retreat(_LATE)
@@ -135,6 +136,13 @@ class Machine(Course):
         self._enter(State.PUSHING, f"pushing on meanwhile; {why}")
         self._say(commands.Repair(self.goal, beginning))
         return True
+
+    def _begins_here(self, plan: list[PushSegment]) -> bool:
+        """Whether a plan begins on the side of the push under way, which is longer with it.
+
+        Where the robot has to back off anyway, a plan is not worth taking before it is complete.
+        """
+        return bool(plan) and plan[0].length > self.segment.length + _LONGER
 
     def _on_repaired(self, plan: list[PushSegment]) -> None:
         """The plan begins with the push under way."""

@@ -40,8 +40,8 @@ from push_supervisor.events import (
 )
 
 
-def segment(side, turns=False):
-    return SimpleNamespace(side=side, object_end=f"end of {side}", turns=turns)
+def segment(side, turns=False, length=2.0):
+    return SimpleNamespace(side=side, object_end=f"end of {side}", turns=turns, length=length)
 
 
 def make(there=False, touching=False, close=True, free=False, **changes):

@@ -30,7 +30,7 @@ from push_supervisor.events import (
 from tests.push_supervisor.test_machine import commands, planned, segment, walk
 
 PREEMPTED = JobAborted(JobError.PREEMPTED, "a new goal replaces this one")
-BEGINNING = segment("beginning")
+BEGINNING = segment("beginning", length=1.0)
 
 
 def pushing(free=True, there=False, **changes):
@@ -150,6 +150,13 @@ def test_a_plan_that_is_still_improved_is_taken_when_the_time_is_up():
     machine.handle(MotionDone())
     assert machine.handle(PlanFound(planned(7).segments, improving=True)) == []
     assert machine.state is State.PLANNING
+
+
+def test_a_plan_that_is_still_improved_is_not_taken_where_the_robot_has_to_back_off_anyway():
+    machine = pushing()
+    machine.handle(WayBlocked("problem"))
+    assert machine.handle(PlanFound((BEGINNING, segment(3)), improving=True)) == []
+    assert commands(machine.handle(RepairLate())) == [CancelRepair, FollowRetreat]
 
 
 @pytest.mark.parametrize("event", [CancelCommanded(), ClockReset()])
