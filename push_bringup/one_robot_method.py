@@ -169,7 +169,7 @@ class OneRobotMethod:
         return repair.beginning(self._near, push, seen.object, seen.obstacles, goal)
 
     def _carry_out(self, command: Command) -> None:
-        self._question = self._repair = None
+        self._repair = None
         self._plans.drop()
         match command:
             case commands.Repair():
@@ -177,6 +177,7 @@ class OneRobotMethod:
             case commands.CancelRepair() | commands.Finish(going_on=True):
                 pass
             case commands.Stop() | commands.CancelPlan() | commands.Finish():
+                self._question = None
                 self._drive.tracker.stop()
             case _:
                 self._ask(command)
@@ -189,7 +190,7 @@ class OneRobotMethod:
 
     def _answer(self, seen: Seen, belief: Belief) -> float:
         """See to the question under way; [s] of CPU time that planning took."""
-        question, began = self._repair or self._question, time.thread_time()
+        question, began = self._question or self._repair, time.thread_time()
         if question is None or (question is self._question and seen.time < self._not_before):
             return 0.0
         match question:

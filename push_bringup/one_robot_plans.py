@@ -33,7 +33,7 @@ _NO_BODY_MATTERS = (PlanError.INVALID_GOAL, PlanError.OUTSIDE_MAP)
 
 
 class Plans:
-    """Answers MakePlan and FindPath, one at a time."""
+    """Answers MakePlan, Repair and FindPath, one at a time."""
 
     def __init__(
         self, settings: PlannerSettings, field: DistanceField, robot: RobotSpec, item: ObjectSpec

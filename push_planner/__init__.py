@@ -13,7 +13,7 @@ from push_planner.push_plan import (
     Progress,
     PushPlan,
 )
-from push_planner.push_reference import going_on, joined
+from push_planner.push_reference import check_under_way, going_on, joined
 from push_planner.robot_path import NoRobotPath, RobotPathError, plan_robot_path
 from push_planner.scene import PushScene, PushSide, push_sides
 from push_planner.settings import PlannerSettings
@@ -34,6 +34,7 @@ __all__ = [
     "PushSide",
     "RobotPathError",
     "TooHeavy",
+    "check_under_way",
     "going_on",
     "joined",
     "plan_after_preemptive_push",

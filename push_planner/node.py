@@ -28,6 +28,7 @@ from push_planner import (
     PushPlan,
     PushPlanner,
     TooHeavy,
+    check_under_way,
     going_on,
     joined,
     plan_among_bodies,
@@ -195,6 +196,8 @@ class PlannerNode(Node):
             if len(request.under_way) > 1:
                 raise InvalidMessage("at most one push can be under way")
             self._under_way = [segment_from_ros(segment) for segment in request.under_way]
+            for push in self._under_way:
+                check_under_way(push, start)
             self._work = self._plan(request, start, goal, robot)
             self._continue()
         except TooHeavy as error:

@@ -85,7 +85,9 @@ class PlanTime:
         change_weight: fraction of the time of a change of the side that counts.
         on_side: index of the side on which the robot pushes when the plan begins.
         """
-        total = change_weight * self.change(on_side, segments[0].side)
+        total = 0.0
+        if on_side is not None and segments[0].side != on_side:
+            total += change_weight * self.change(on_side, segments[0].side) + self.begin
         before: PushSegment | None = None
         for s in segments:
             goes_on = before is not None and s.side == before.side and not (s.turns or before.turns)

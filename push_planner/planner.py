@@ -93,7 +93,8 @@ class PushPlanner:
         thorough: whether a long search follows where the others find no plan, and whether the lower
         bound is raised by searches. robot: ``(3,)`` pose of the robot, from which it
         must have a way to the first side; None if unknown. on_side: index of the side on which the
-        robot pushes when the plan begins: to go on there takes no change of the side.
+        robot pushes when the plan begins: to go on there takes no change of the side. This counts
+        in the costs and in the searches among poses; the search over arcs does not know of it.
 
         The last report carries the final plan, with the lower bound of all costs. A plan that is
         reported never costs more than one before it; only the final one may, by ``easing``.

@@ -6,13 +6,16 @@ from itertools import groupby
 
 import numpy as np
 
+from push_model import se2
 from push_model.arrays import Array
 from push_model.kinematics import DifferentialDrive
 from push_model.push_segment import PushSegment
 from push_model.trajectory import Trajectory, along_curve
 from push_planner.push_curve import PushCurve
+from push_planner.push_plan import PlanError, PlanningFailed
 from push_planner.settings import PlannerSettings
 
+_OFF = 1e-3  # [m], [rad] between the end of a push and where it goes on
 _MOVING = 1e-3  # [m/s] of a sample that has a curvature
 _SPACING = 0.005  # [m] of samples
 _SAMPLES = 20  # of a curve, at least
@@ -83,6 +86,20 @@ def joined(
             )
         )
     return tuple(result)
+
+
+def check_under_way(push: PushSegment, start: Array) -> None:
+    """Raise PlanningFailed unless a plan that begins with the object at ``(3,)`` can go on from the
+    end of a push."""
+    off = se2.between(start, push.object_end)
+    if np.hypot(off[0], off[1]) > _OFF or abs(off[2]) > _OFF:
+        raise PlanningFailed(
+            PlanError.INVALID_GOAL, "the push under way must end where the plan starts"
+        )
+    if push.turns or push.trajectory.twist[:, 0].max() <= _MOVING:
+        raise PlanningFailed(
+            PlanError.INVALID_GOAL, "the push under way must move forward, and not on a corner"
+        )
 
 
 def going_on(

@@ -154,6 +154,7 @@ class GoalClient:
 
         cancel: whether the goal before is canceled; if not, the server replaces it.
         """
+        kept = None if cancel else self._handle
         if not cancel:
             self._handle = None
         self.forget()
@@ -165,6 +166,8 @@ class GoalClient:
 
         def on_response(future: Any) -> None:
             handle = future.result()
+            if kept is not None and (handle is None or not handle.accepted):
+                kept.cancel_goal_async()  # nothing has replaced it
             if token != self._token:
                 if handle is not None and handle.accepted:
                     handle.cancel_goal_async()  # canceled before it was accepted

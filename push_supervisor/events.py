@@ -96,6 +96,11 @@ class WayBlocked:
 
 
 @dataclass(frozen=True)
+class PushLeft:
+    """A push goes on for a job that another goal was to follow, and none has."""
+
+
+@dataclass(frozen=True)
 class RepairLate:
     """The robot comes to where a new plan is to begin, and it is not complete yet."""
 
@@ -126,6 +131,7 @@ Event = (
     | ObjectMoved
     | MapChanged
     | WayBlocked
+    | PushLeft
     | RepairLate
     | ClockReset
     | JobAborted

@@ -45,6 +45,11 @@ class Machine(Course):
         self._found: list[PushSegment] = []  # the plan so far, while it is still improved
 
     @property
+    def left(self) -> bool:
+        """Whether a push goes on after the end of its job, for a goal that is to follow at once."""
+        return self._left is not None
+
+    @property
     def repairing(self) -> bool:
         """Whether the robot goes on with a push while a new plan is made."""
         return self._repair is not None
@@ -90,7 +95,7 @@ class Machine(Course):
             case events.PlanFound() if self.repairing:
                 self._on_repaired(list(event.segments))
             case events.PlanFailed() if self.repairing:
-                self._retreat(event.message)
+                self._unrepaired(event.message)
             case events.PathFound() if state is State.POSITIONING:
                 self._on_path(event)
             case events.PathFailed() if state is State.POSITIONING:
@@ -98,7 +103,7 @@ class Machine(Course):
             case events.RepairLate() if self.repairing and self._begins_here(self._found):
                 self._on_repaired(self._found)
             case events.MotionDone() | events.RepairLate() if self.repairing:
-                self._retreat(_LATE)
+                self._unrepaired(_LATE)
             case events.MotionDone() if state in MOVING:
                 self._on_motion_done()
             case events.MotionFailed() if state in MOVING:
@@ -136,6 +141,14 @@ class Machine(Course):
         self._enter(State.PUSHING, f"pushing on meanwhile; {why}")
         self._say(commands.Repair(self.goal, beginning))
         return True
+
+    def _unrepaired(self, why: str) -> None:
+        """Back off and plan. A new goal whose plan did not come in time has had no setback yet."""
+        if self._blocked:
+            self._retreat(why)
+        else:
+            self.segments, self.index = [], 0
+            self._back_off(f"planning for a new goal: {why}")
 
     def _begins_here(self, plan: list[PushSegment]) -> bool:
         """Whether a plan begins on the side of the push under way, which is longer with it.
@@ -200,6 +213,7 @@ class Machine(Course):
         self._plan_anew(message)
 
     def _on_map(self, problem: str) -> None:
+        self._found = []  # made on the map before
         if problem:
             self._on_blocked(problem)
         elif self.state is State.POSITIONING:  # the way there may lead through a wall now

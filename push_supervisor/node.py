@@ -212,6 +212,8 @@ class SupervisorNode(Node):
         if frame.verdict is Stamp.RESET:
             self._fire(events.ClockReset())
             self._intake.reset()
+        if self.machine.left:
+            self._fire(events.PushLeft())
         self._ticks += 1
         self._heartbeat_publisher.publish(Header(stamp=frame.stamp, frame_id=FRAME))
         self._tend()
@@ -263,21 +265,18 @@ class SupervisorNode(Node):
                 self._ask(-self._repairs, command)
             case commands.CancelRepair():
                 self._peers.stop_planning()
-            case commands.Stop() | commands.CancelPlan():
-                self._let_go()
-            case commands.Finish(code, message, going_on):
-                if not going_on:
-                    self._let_go()
+            case commands.Finish(code, message, going_on=True):
                 self._finish(code, message)
+            case commands.Stop() | commands.CancelPlan() | commands.Finish():
+                self._requests.drop()
+                self._peers.let_go()
+                if isinstance(command, commands.Finish):
+                    self._finish(command.code, command.message)
             case _:
                 waits = isinstance(command, commands.MakePlan | commands.FindPath) and command.later
                 delay = self.settings.wait if waits else 0.0
                 self._requests.begin(Request(command, delay), self._now())
                 self._tend()
-
-    def _let_go(self) -> None:
-        self._requests.drop()
-        self._peers.let_go()
 
     def _now(self) -> Moment:
         """The clocks and who is there."""
@@ -305,7 +304,9 @@ class SupervisorNode(Node):
         self._requests.sign(number, self._now())
 
     def _on_answer(self, number: int, event: Event) -> None:
-        if self._requests.answer(number) or (number == -self._repairs and self.machine.repairing):
+        if number == -self._repairs and self.machine.repairing:
+            self._fire(repair.checked(event, self.surroundings, self._pose(self.object)))
+        elif self._requests.answer(number):
             self._fire(event)
 
     def _ask(self, number: int, command: Question | commands.Repair) -> None:

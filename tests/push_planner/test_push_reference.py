@@ -8,7 +8,14 @@ import pytest
 from push_model import se2
 from push_model.occupancy import rasterise
 from push_model.specs import EnvironmentSpec
-from push_planner import PlannerSettings, PushPlanner, going_on, joined
+from push_planner import (
+    PlannerSettings,
+    PlanningFailed,
+    PushPlanner,
+    check_under_way,
+    going_on,
+    joined,
+)
 from push_planner.push_curve import shortest_push_curve
 from push_planner.push_graph import PushStep
 
@@ -116,6 +123,20 @@ def test_a_push_under_way_goes_on_with_a_new_one_on_its_side(planner, robot, see
     assert v[inner].min() > 0.03, "it does not stop between"
     rise = np.diff(v**2) / (2.0 * np.maximum(np.diff(t.travelled), 1e-9))
     assert np.abs(rise).max() <= SETTINGS.push_acceleration * 1.05
+
+
+def test_only_a_push_that_moves_and_ends_at_the_start_can_be_under_way(planner):
+    one = push(planner, 0, BEGIN, END)
+    check_under_way(one, one.object_end)
+    off = one.object_end + np.array([2e-3, 0.0, 0.0])
+    still = replace(one.trajectory, twist=np.zeros_like(one.trajectory.twist))
+    for bad, start in (
+        (one, off),
+        (replace(one, turns=True), one.object_end),
+        (replace(one, trajectory=still), one.object_end),
+    ):
+        with pytest.raises(PlanningFailed):
+            check_under_way(bad, start)
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -24,6 +24,7 @@ from push_supervisor.events import (
     PathFound,
     PlanFailed,
     PlanFound,
+    PushLeft,
     RepairLate,
     WayBlocked,
 )
@@ -74,11 +75,14 @@ def test_a_new_goal_does_not_stop_a_push_that_is_free():
         ClockReset(),
         MotionDone(),
         MapChanged("problem"),
+        PushLeft(),
     ],
 )
 def test_a_push_that_was_left_to_go_on_stops_unless_a_goal_of_the_same_object_follows(event):
     machine = pushing()
+    assert not machine.left
     machine.handle(PREEMPTED)
+    assert machine.left
     assert Stop in commands(machine.handle(event))
 
 
@@ -134,6 +138,27 @@ def test_without_a_plan_in_time_the_robot_backs_off_and_plans(event):
     assert commands(repaired(machine, 5)) == []  # too late
     assert commands(machine.handle(MotionDone())) == [MakePlan]
     assert machine.replans == 1
+
+
+@pytest.mark.parametrize(
+    "event", [PlanFailed(JobError.PLANNING_FAILED, "no plan"), RepairLate(), MotionDone()]
+)
+def test_that_the_plan_for_a_new_goal_is_late_is_no_setback(event):
+    machine = pushing(max_replans=0)
+    machine.handle(PREEMPTED)
+    machine.handle(GoalGiven("h", item="box"))
+    out = commands(machine.handle(event))
+    assert out[-1] is FollowRetreat and machine.state is State.DETACHING
+    (ask,) = machine.handle(MotionDone())
+    assert isinstance(ask, MakePlan) and ask.goal == "h" and machine.replans == 0
+
+
+def test_what_was_found_on_the_map_before_does_not_count():
+    machine = pushing()
+    machine.handle(WayBlocked("problem"))
+    machine.handle(PlanFound(planned(6).segments, improving=True))
+    assert machine.handle(MapChanged()) == []
+    assert commands(machine.handle(RepairLate())) == [CancelRepair, FollowRetreat]
 
 
 def test_a_plan_that_is_still_improved_is_taken_when_the_time_is_up():

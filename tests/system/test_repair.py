@@ -168,7 +168,7 @@ def test_a_planner_that_hangs_during_a_repair_is_waited_for_without_contact():
         assert np.hypot(*(run.run.observer.trace.object[-1] - item)[:2]) < 0.2
         planner._continue = work
         work()
-        run.reached(goal, replans=1)
+        run.reached(goal)
 
 
 def test_equal_runs_have_equal_repairs():
