@@ -41,7 +41,7 @@ from push_supervisor import (
 )
 from push_supervisor.arrival import Arrival, arrival
 from push_supervisor.blocked_way import BlockedWay
-from push_supervisor.commands import Command, Question
+from push_supervisor.commands import Command, Motion, Question
 from push_supervisor.displacement import PERIOD
 
 SECTIONS: dict[str, type[Any]] = {
@@ -133,6 +133,8 @@ class OneRobotMethod:
         if self._goal is not None:
             goal, self._goal = self._goal, None
             self._fire(events.GoalGiven(goal))
+        elif self.machine.left:
+            self._fire(events.PushLeft())
         if not seen.time - self._looked < PERIOD - 1e-9:
             self._looked = seen.time
             self._tell(self._displacement.look(seen.object))
@@ -140,6 +142,8 @@ class OneRobotMethod:
             if self.machine.repairing:
                 self._tell(repair.late(self.machine.segment, seen.object))
             self._tell(self._blocked_way.look(self._near, robot, seen.object, seen.obstacles))
+        if isinstance(self._question, commands.FollowPush) and self._question.going_on:
+            self._start(self._question, seen, belief)  # before the push under way can end
         command, event = self._drive.follow(seen, self._near.robot.body_radius)
         self._tell(event)
         if self._name in seen.robots:
@@ -201,12 +205,17 @@ class OneRobotMethod:
             case commands.FindPath():
                 event = self._plans.way(question, seen.robots[self._name], seen, self._near)
             case _:
-                self._question = None
-                self._tell(self._drive.start(question, self._near, seen, belief))
+                self._start(question, seen, belief)
                 return 0.0
         spent = time.thread_time() - began
         self._tell(event)
         return spent
+
+    def _start(self, motion: Motion, seen: Seen, belief: Belief) -> None:
+        """Begin a motion, if the robot is seen; otherwise it waits."""
+        if self._name in seen.robots:
+            self._question = None
+            self._tell(self._drive.start(motion, self._near, seen, belief))
 
     def report(self, seen: Seen) -> Report | None:
         """See Method: the tracker's figures, and the pushes that are left."""

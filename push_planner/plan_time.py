@@ -67,12 +67,19 @@ class PlanTime:
         mean = float(parts @ (0.5 * (pace[1:] + pace[:-1])) / parts.sum())
         return curve.length * mean
 
-    def change(self, before: int | None, after: int) -> float:
-        """[s] of a change from a side to another, by their indices; 0 where there is none before
-        or it has no contact."""
-        if before is None or before not in self._numbers:
-            return 0.0
+    def change(self, before: int, after: int) -> float:
+        """[s] of a change from a side to another, by their indices."""
         return float(self.changes[self._numbers[before], self._numbers[after]])
+
+    def first_change(self, on_side: int | None, first: int, change_weight: float = 1.0) -> float:
+        """[s] until a plan's first push begins, by the index of its side.
+
+        on_side: of the side on which the robot pushes when the plan begins. None, the same, or one
+        on which nothing is planned: 0.
+        """
+        if on_side in (None, first) or on_side not in self._numbers:
+            return 0.0
+        return change_weight * self.change(on_side, first) + self.begin
 
     def of_plan(
         self,
@@ -85,9 +92,7 @@ class PlanTime:
         change_weight: fraction of the time of a change of the side that counts.
         on_side: index of the side on which the robot pushes when the plan begins.
         """
-        total = 0.0
-        if on_side is not None and segments[0].side != on_side:
-            total += change_weight * self.change(on_side, segments[0].side) + self.begin
+        total = self.first_change(on_side, segments[0].side, change_weight)
         before: PushSegment | None = None
         for s in segments:
             goes_on = before is not None and s.side == before.side and not (s.turns or before.turns)

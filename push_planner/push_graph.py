@@ -125,12 +125,7 @@ class PushGraph:
         # After a change the robot speeds up anew.
         self._changes = change_weight * time.changes
         self._changes += time.begin * (1.0 - np.eye(len(self._changes)))
-        self._first = [
-            0.0
-            if on_side in (None, s.index)
-            else change_weight * time.change(on_side, s.index) + time.begin
-            for s in scene.sides
-        ]
+        self._first = [time.first_change(on_side, s.index, change_weight) for s in scene.sides]
         self.begin = time.begin
         """[s] that the first push takes longer, because the robot speeds up and brakes."""
         self._pace = time.pace

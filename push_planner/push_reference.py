@@ -72,20 +72,23 @@ def joined(
         if len(run) == 1:
             result.append(run[0])
             continue
-        first, last = run[0], run[-1]
         curves = [PushCurve(s.robot_start, s.robot_end, s.k_start, s.k_end, s.length) for s in run]
-        result.append(
-            replace(
-                first,
-                object_end=last.object_end,
-                robot_end=last.robot_end,
-                k_end=last.k_end,
-                length=sum(s.length for s in run),
-                clearance=min(s.clearance for s in run),
-                trajectory=push_reference(curves, drive, settings),
-            )
-        )
+        result.append(_merged(run, push_reference(curves, drive, settings)))
     return tuple(result)
+
+
+def _merged(run: Sequence[PushSegment], trajectory: Trajectory) -> PushSegment:
+    """Pushes in a row on the same side as one, along a trajectory."""
+    first, last = run[0], run[-1]
+    return replace(
+        first,
+        object_end=last.object_end,
+        robot_end=last.robot_end,
+        k_end=last.k_end,
+        length=sum(s.length for s in run),
+        clearance=min(s.clearance for s in run),
+        trajectory=trajectory,
+    )
 
 
 def check_under_way(push: PushSegment, start: Array) -> None:
@@ -119,14 +122,5 @@ def going_on(
     if first.side != under_way.side or first.turns:
         head = replace(under_way, trajectory=_along([begun], drive, settings))
         return head, *segments
-    parts = [begun, _of_trajectory(first.trajectory)]
-    whole = replace(
-        under_way,
-        object_end=first.object_end,
-        robot_end=first.robot_end,
-        k_end=first.k_end,
-        length=under_way.length + first.length,
-        clearance=min(under_way.clearance, first.clearance),
-        trajectory=_along(parts, drive, settings),
-    )
-    return whole, *segments[1:]
+    way = _along([begun, _of_trajectory(first.trajectory)], drive, settings)
+    return _merged([under_way, first], way), *segments[1:]

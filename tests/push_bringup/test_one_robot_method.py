@@ -294,3 +294,27 @@ def test_a_goal_that_moves_in_mid_push_is_planned_for_while_the_robot_pushes():
             assert reasons[1].startswith("push 1 of") or "not ready in time" in reasons[1]
             repaired += reasons[1].startswith("push 1 of")
     assert repaired >= 5
+
+
+def test_a_push_whose_job_was_replaced_stops_when_no_goal_follows():
+    book = Notebook("short")
+    book.pushing()
+    assert book.commands[0] > 0.0
+    book.method.end(JobError.PREEMPTED, "a new goal replaces this one")
+    book.step()
+    assert book.commands == (0.0, 0.0) and book.method.status.code == JobError.PREEMPTED
+
+
+@pytest.mark.parametrize("frames", range(72, 132, 6))
+def test_a_push_that_ends_while_a_plan_is_made_for_a_new_goal_is_no_push_of_that_plan(frames):
+    """The new goal comes about a second before the end of the push."""
+    book = Notebook("short")
+    book.begin()
+    machine = book.method.machine
+    book.until(lambda: book.method.status.phase == JobPhase.PUSHING)
+    duration = machine.segment.trajectory.duration
+    end = book.time + duration - 0.01 * frames
+    book.until(lambda: book.time >= end)
+    book.goal = book.goal + np.array([0.3, 0.05, 0.0])
+    book.begin()
+    assert book.finish().code == 0 and book.away < 4.5e-3

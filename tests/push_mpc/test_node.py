@@ -138,3 +138,30 @@ def test_it_reports_again_after_the_clock_went_back(course):
         for _ in range(3):
             course.step()
     assert counts[1] >= counts[0] - 2, counts
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {},
+        {"mode": FollowTrajectory.Goal.PUSH, "object": "box"},
+    ],
+)
+def test_without_a_push_there_is_none_to_go_on_with(course, fields):
+    """Neither for a robot that stands nor for one that drives alone, which goes on."""
+    course.step()
+    for moving in (False, True):
+        if moving:
+            course.follow()
+            for _ in range(50):
+                course.step()
+        way = trajectory_to_ros(line(course.poses["me"], 1.0, 0.1, 0.2))
+        goal = FollowTrajectory.Goal(
+            trajectory=way, going_on=True, curvature_min=-2.0, curvature_max=2.0, **fields
+        )
+        sent = course.client.send_goal_async(goal)
+        assert course.spinner.until(sent.done, 15.0) and not sent.result().accepted
+        for _ in range(10):
+            course.step()
+        assert course.controller.tracker.active is moving
+        assert (course.answer.twist.linear.x > 0.05) is moving

@@ -196,3 +196,29 @@ def test_a_goal_that_is_canceled_while_it_is_judged_is_not_taken(slow):
     assert slow.until(answer.done)
     assert answer.result().status == GoalStatus.STATUS_CANCELED
     assert not slow.started and not slow.canceled and not slow.server.active
+
+
+def test_a_goal_may_be_left_to_be_replaced_by_the_next_one(world):
+    """It is not canceled, not even for a moment."""
+    first, second = [], []
+    world.client.send(MoveObject.Goal(object="box"), first.append)
+    assert world.until(lambda: world.server.active and world.client._handle is not None)
+    world.client.send(MoveObject.Goal(object="crate"), second.append, cancel=False)
+    assert world.until(lambda: world.started == ["box", "crate"])
+    world.until(lambda: False, 0.3)
+    assert world.canceled == 0 and world.server.active
+    world.server.finish(MoveObject.Result(pushes=2), success=True)
+    assert world.until(lambda: second) and not first
+
+
+@pytest.mark.parametrize("forgotten", [False, True])
+def test_a_goal_that_nothing_has_replaced_is_canceled(world, forgotten):
+    """Also where the client has forgotten both by then."""
+    results = []
+    world.client.send(MoveObject.Goal(object="box"), lambda result: None)
+    assert world.until(lambda: world.server.active and world.client._handle is not None)
+    world.client.send(MoveObject.Goal(object="bad"), results.append, cancel=False)
+    if forgotten:
+        world.client.forget()
+    assert world.until(lambda: world.canceled == 1) and not world.server.active
+    assert results == ([] if forgotten else [None])
