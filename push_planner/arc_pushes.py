@@ -29,19 +29,22 @@ def pushes_over_arcs(
     robot: Array | None,
     nodes: int,
     statistics: SearchStatistics,
+    on_side: int | None = None,
 ) -> Generator[None, None, tuple[PushStep, ...] | None]:
     """Search in slices for pushes that cost less than ``bound`` [s]; None if there are none.
 
     robot: ``(3,)`` pose of the robot, or None. nodes: that each of the two searches may make.
+    on_side: index of the side on which the robot pushes at the start; None if it does not.
     """
-    graph = PushGraph(scene, ends.start, ends.goal, NOTHING, np.inf, robot)
+    graph = PushGraph(scene, ends.start, ends.goal, NOTHING, np.inf, robot, on_side=on_side)
+    first = np.array([graph.first_change(side) for side in range(len(scene.sides))])
     begins = np.array([leaves and graph.may_begin(k) for k, leaves in enumerate(ends.leaves)])
     best: tuple[PushStep, ...] | None = None
     for backward in (False, True):
-        search = ArcSearch(scene, ends, begins, backward, bound, nodes)
+        search = ArcSearch(scene, ends, begins, backward, bound, nodes, first)
         yield from search.run()
         if search.cost < math.inf:
-            found = _pushes_along(scene, *search.path(), robot, statistics)
+            found = _pushes_along(scene, *search.path(), robot, statistics, on_side)
             if found is not None and found[1] < bound:
                 best, bound = found
             yield
@@ -54,6 +57,7 @@ def _pushes_along(
     sides: NDArray[np.int64],
     robot: Array | None,
     statistics: SearchStatistics,
+    on_side: int | None = None,
 ) -> tuple[tuple[PushStep, ...], float] | None:
     """Pushes along a path and their cost [s]; None if one is not possible.
 
@@ -61,13 +65,13 @@ def _pushes_along(
     ----------
     poses: ``(n, 3)`` [m, m, rad] of the object's centre of mass, the start and the goal included.
     sides: ``(n - 1,)`` numbers of the sides on which the object is pushed between them.
-    robot: ``(3,)`` pose of the robot, or None.
+    robot, on_side: see ``pushes_over_arcs``.
     """
     between = Candidates(poses[1:-1], np.arange(len(poses) - 2, dtype=np.float64))
-    graph = PushGraph(scene, poses[0], poses[-1], between, np.inf, robot)
+    graph = PushGraph(scene, poses[0], poses[-1], between, np.inf, robot, on_side=on_side)
     changes = np.flatnonzero(np.diff(sides)) + 1
     steps: list[PushStep] = []
-    cost, first = graph.begin, 0
+    cost, first = graph.begin + graph.first_change(int(sides[0])), 0
     if not graph.may_begin(int(sides[0])):
         return None
     for last in (*changes.tolist(), len(poses) - 1):

@@ -46,11 +46,12 @@ _SLICE = 4000  # nodes between two reports
 
 class _Target(NamedTuple):
     """The other end of the search: ``(sides, 3)`` poses of the robot in contact there, ``(sides,)``
-    whether it has room, what bounds runs and ways to there (``RunEnds``), and 1 forward, -1
-    backward."""
+    whether it has room, and [s] that a plan costs more for its side there, what bounds runs and
+    ways to there (``RunEnds``), and 1 forward, -1 backward."""
 
     robots: Any
     reached: Any
+    extra: Any
     radii: Any
     fastest: Any
     ways: Any
@@ -227,10 +228,11 @@ def _advance(
         tree.counts[2] += 1
         robot = _placed(pose, sides.contacts, side)
         if target.reached[side]:
-            most, near = (tree.best[0] - cost) / pace, tree.counts[2] % _FAR != 0
+            least = cost + target.extra[side]
+            most, near = (tree.best[0] - least) / pace, tree.counts[2] % _FAR != 0
             length = _last_push(robot, side, target, sides, room, most, near, coarse, dense)
             if length < math.inf:
-                tree.best[0], tree.best[1] = cost + pace * length, n
+                tree.best[0], tree.best[1] = least + pace * length, n
         low, high = sides.limits[side]
         for bend in bends:
             turn = step * target.direction * bend * (high if bend > 0.0 else -low)
@@ -276,29 +278,33 @@ class ArcSearch:
         backward: bool,
         bound: float,
         most: int,
+        first: Array | None = None,
     ) -> None:
         """Prepare the search.
 
         begins: ``(sides,)`` whether the robot has room at the side at the start, and a way to it.
         backward: from the goal to the start. bound: [s] the plan must cost less. most: number of
-        nodes at most.
+        nodes at most. first: ``(sides,)`` [s] until a first push on the side begins; None for 0.
         """
         time, sides = scene.time, scene.sides
+        none = np.zeros(len(sides))
+        first = none if first is None else first
         pose, self._target = (ends.goal, ends.start) if backward else (ends.start, ends.goal)
         self._backward = backward
         known = ends.radii, ends.fastest
         if backward:
             gone = ends.gone
-            target = _Target(ends.starts, begins, *known, gone.levels, gone.places, -1.0)
+            target = _Target(ends.starts, begins, first, *known, gone.levels, gone.places, -1.0)
         else:
             left = ends.left
-            target = _Target(ends.goals, ends.arrives, *known, left.levels, left.places, 1.0)
+            target = _Target(ends.goals, ends.arrives, none, *known, left.levels, left.places, 1.0)
         limits = np.array([[s.trusted.minimum, s.trusted.maximum] for s in sides])
         chords = np.array([shortest_chords(*limit) for limit in limits])
         changes = time.changes.copy()
         np.fill_diagonal(changes, math.inf)
         room = room_of(scene, pose, backward)
-        self._tree = self._planted(scene, pose, ends.arrives if backward else begins, bound, most)
+        roots = (ends.arrives, none) if backward else (begins, first)
+        self._tree = self._planted(scene, pose, *roots, bound, most)
         self._known = (
             target,
             _Sides(np.array([s.grasp for s in sides]), ends.contacts, limits, chords),
@@ -308,9 +314,15 @@ class ArcSearch:
         )
 
     def _planted(
-        self, scene: PushScene, pose: Array, begins: NDArray[np.bool_], bound: float, most: int
+        self,
+        scene: PushScene,
+        pose: Array,
+        begins: NDArray[np.bool_],
+        extra: Array,
+        bound: float,
+        most: int,
     ) -> _Tree:
-        """A tree with a node for each side."""
+        """A tree with a node for each side, which costs so much more [s]."""
         x0, x1, y0, y1 = scene.field.grid.extent
         count = len(scene.sides)
         width = max(_WIDTH, math.sqrt((x1 - x0) * (y1 - y0) * _ANGLES * count / _MOST))
@@ -328,7 +340,8 @@ class ArcSearch:
             np.array([bound, -1.0]),
         )
         for n, side in enumerate(np.flatnonzero(begins)):
-            tree.poses[n], tree.costs[n], tree.sides[n] = pose, scene.time.begin, side
+            tree.poses[n], tree.sides[n] = pose, side
+            tree.costs[n] = scene.time.begin + extra[side]
             tree.counts[:2] = n + 1, heap.push(tree.keys, tree.items, n, 0.0, n)
         return tree
 

@@ -36,12 +36,14 @@ def gentler(
     robot: Array | None,
     random: np.random.Generator,
     statistics: SearchStatistics,
+    on_side: int | None = None,
 ) -> tuple[PushStep, ...] | None:
     """Pushes from the same start to the same goal with wider bends.
 
     Parameters
     ----------
     segments: the pushes of a plan. cost: [s] of it. robot: ``(3,)`` pose of the robot, or None.
+    on_side: index of the side on which the robot pushes at the start; None if it does not.
 
     The result costs at most the part ``easing`` more. It is None if nothing gentler was found.
     """
@@ -49,7 +51,7 @@ def gentler(
     steps: Sequence[PushStep] = given
     limit = (1.0 + scene.settings.easing) * cost
     for part in _SEARCHED:
-        found = _near(scene.bending_less(part), steps, limit, robot, random, statistics)
+        found = _near(scene.bending_less(part), steps, limit, robot, random, statistics, on_side)
         if found is not None:
             steps, cost = found
             break
@@ -79,6 +81,7 @@ def _near(
     robot: Array | None,
     random: np.random.Generator,
     statistics: SearchStatistics,
+    on_side: int | None,
 ) -> tuple[tuple[PushStep, ...], float] | None:
     """The cheapest pushes by way of poses near those of a plan, below a cost [s]."""
     found, cost = None, (1.0 + _FIRST) * limit
@@ -86,7 +89,7 @@ def _near(
     between = [step.object_end for step in steps[:-1]]
     for size in _SIZES if between else ():
         poses = nearby(np.array(between), _POSES, size, random).free(scene)
-        graph = PushGraph(scene, start, goal, poses, np.inf, robot)
+        graph = PushGraph(scene, start, goal, poses, np.inf, robot, on_side=on_side)
         search = PushSearch(graph, cost, 1.0, scene.settings.max_expansions)
         for _ in search.run(statistics):
             pass

@@ -93,8 +93,7 @@ class PushPlanner:
         thorough: whether a long search follows where the others find no plan, and whether the lower
         bound is raised by searches. robot: ``(3,)`` pose of the robot, from which it
         must have a way to the first side; None if unknown. on_side: index of the side on which the
-        robot pushes when the plan begins: to go on there takes no change of the side. This counts
-        in the costs and in the searches among poses; the search over arcs does not know of it.
+        robot pushes when the plan begins: to go on there takes no change of the side.
 
         The last report carries the final plan, with the lower bound of all costs. A plan that is
         reported never costs more than one before it; only the final one may, by ``easing``.
@@ -204,7 +203,7 @@ class PushPlanner:
                 break
             if number == 0 and best.cost > (1.0 + _NEAR_BOUND) * work.least:
                 found = yield from self._over_arcs(best, ends[1], run_ends, work)
-                if found.cost < best.cost:
+                if found is not best:
                     best = found
                     yield Progress("improving", best)
                     continue
@@ -240,7 +239,8 @@ class PushPlanner:
     ) -> Generator[Progress, None, PushPlan]:
         """Search over arcs below the cost of the best plan. Returns the best plan."""
         bound, nodes = (1.0 - _WORTH) * best.cost, self.settings.arc_nodes
-        search = pushes_over_arcs(self.scene, run_ends, bound, work.robot, nodes, work.statistics)
+        given = work.robot, nodes, work.statistics, work.on_side
+        search = pushes_over_arcs(self.scene, run_ends, bound, *given)
         while True:
             try:
                 next(search)
@@ -251,13 +251,9 @@ class PushPlanner:
 
     def _eased(self, best: PushPlan, work: Work) -> PushPlan:
         """The best plan with wider bends, or itself."""
-        cost = self.scene.time.of_plan(best.segments)
-        found = gentler(self.scene, best.segments, cost, work.robot, work.random, work.statistics)
-        if found is None:
-            return best
-        eased = self._assemble(found, best.goal, best.guide, work)
-        far = work.on_side is not None and eased.segments[0].side != best.segments[0].side
-        return best if far else eased
+        given = work.robot, work.random, work.statistics, work.on_side
+        found = gentler(self.scene, best.segments, best.cost, *given)
+        return best if found is None else self._assemble(found, best.goal, best.guide, work)
 
     def _cost(
         self, segments: Sequence[PushSegment], work: Work, change_weight: float = 1.0
