@@ -89,9 +89,9 @@ class SupervisorSettings:
         low=0.0,
         high=60.0,
         doc="Time that the robot goes on with a push while a new plan is made, when the goal has "
-        "moved or a later part of the plan is blocked (s). If there is none 0.5 s before the "
-        "end of this time, the robot backs off, and a plan is made from there. Below 0.7 it always "
-        "backs off first.",
+        "moved or a later part of the plan is blocked (s). If there is no plan 0.5 s before "
+        "the end of this time, the robot backs off, and a plan is made from where the object is "
+        "then. With less than 0.7 the robot always backs off first.",
     )
     wait: float = bounded(
         3.0,

@@ -63,6 +63,7 @@ def test_a_goal_that_moves_is_planned_for_while_the_robot_pushes(aside):
         assert run.state.job == 2
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("repair_time", [0.0, 0.6])
 def test_without_time_for_a_plan_the_robot_backs_off_first(repair_time):
     scenario = load_scenario("short").settings("supervisor", repair_time=repair_time)
@@ -77,6 +78,7 @@ def test_without_time_for_a_plan_the_robot_backs_off_first(repair_time):
         run.reached(goal)
 
 
+@pytest.mark.long
 def test_the_robot_backs_off_first_where_going_on_leads_away_from_the_goal():
     with runs(load_scenario("short")) as run:
         run.by_topic(run.goal)
@@ -89,6 +91,7 @@ def test_the_robot_backs_off_first_where_going_on_leads_away_from_the_goal():
         run.reached(goal)
 
 
+@pytest.mark.long
 def test_a_goal_for_another_object_stops_the_push():
     scenario = load_scenario("short")
     spec, _ = scenario.objects["box"]
@@ -116,6 +119,7 @@ def test_a_wall_behind_the_robot_changes_nothing():
         assert [name for name, _ in states_since(run, count)] == ["IDLE"]
 
 
+@pytest.mark.long
 def test_a_wall_further_on_is_gone_round_without_a_stop():
     with runs(load_scenario("short")) as run:
         goal = np.array([0.8, 0.0, 0.0])
@@ -151,6 +155,7 @@ def test_cancel_during_a_repair_stops_the_robot():
         assert np.hypot(*(robot[-1] - robot[-20])[:2]) < 1e-3
 
 
+@pytest.mark.long
 def test_a_planner_that_hangs_during_a_repair_is_waited_for_without_contact():
     """The push ends in time, and the job goes on when the planner does."""
     with runs(load_scenario("short")) as run:
@@ -171,6 +176,7 @@ def test_a_planner_that_hangs_during_a_repair_is_waited_for_without_contact():
         run.reached(goal)
 
 
+@pytest.mark.long
 def test_equal_runs_have_equal_repairs():
     """To the bit, also where the plan is made while the world goes on."""
 
