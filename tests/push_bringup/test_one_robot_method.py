@@ -305,7 +305,7 @@ def test_a_push_whose_job_was_replaced_stops_when_no_goal_follows():
     assert book.commands == (0.0, 0.0) and book.method.status.code == JobError.PREEMPTED
 
 
-@pytest.mark.parametrize("frames", (72, 81, 90, 120))
+@pytest.mark.parametrize("frames", [72, 81, 90, 120])
 def test_a_push_that_ends_while_a_plan_is_made_for_a_new_goal_is_no_push_of_that_plan(frames):
     """The new goal comes about a second before the end of the push."""
     book = Notebook("short")
