@@ -1,7 +1,7 @@
 """A scripted baseline for the environments of ``push_gym``: push the object towards the goal.
 
 ``gym_push_by_push.py [Single|Group|Swarm] [EPISODES]`` uses actions of the level "push", each of
-which says where the object shall go next. It needs ``pip install "planar-push[gym]"``, and no ROS.
+which says where the object shall go next. docs/learning.md says how to install what it needs.
 """
 
 import sys

@@ -1,8 +1,8 @@
 """Train an agent on ``PlanarPush/Single-v0`` with a library of other people: Stable-Baselines3.
 
 ``gym_train.py [SECONDS] [FILE]`` trains soft actor-critic with hindsight replay for so many seconds
-of wall time, tests it, and writes it to a file. It needs ``pip install "planar-push[gym]"
-stable-baselines3``, and no ROS.
+of wall time, tests it, and writes it to a file. docs/learning.md says how
+to install what it needs.
 """
 
 import sys

@@ -96,9 +96,8 @@ class GroupMethod:
         if math.isnan(task.goal[2]):
             return Refusal(JobError.INVALID_GOAL, "the goal of a group needs a heading")
         if self._finder.clearance(item.mass_pose(task.goal), Obstacles())[0] <= 0.0:
-            return Refusal(
-                JobError.GOAL_OCCUPIED, "at the goal the object needs room for robots all around it"
-            )
+            text = "the object would overlap an obstacle at the goal"
+            return Refusal(JobError.GOAL_OCCUPIED, text)
         return Certificate(robots=2)
 
     def _begins_here(

@@ -1,4 +1,4 @@
-"""Environments for learning: ``pip install "planar-push[gym]"``, then ``import push_gym``.
+"""Environments for learning: docs/learning.md says how to install them, then ``import push_gym``.
 
 ``gymnasium.make("PlanarPush/Single-v0")``, ``-Group-v0`` and ``-Swarm-v0``;
 ``gymnasium.make_vec(…, num_envs=64)`` for many rooms in one compiled call; and

@@ -280,6 +280,23 @@ def test_2_24_the_lateral_force_feels_the_turn_of_the_velocity():
     assert worst > 10.0
 
 
+def test_2_29_to_2_32_two_wheels_bear_the_sideways_force_once():
+    """Truth: masses times accelerations by differences of places. As printed, it counts twice."""
+    share, worst = WheelSlipSettings().sideways_share, 0.0
+    for robot, u, _, body, axle in torque_cases():
+        aside = robot.body_mass * body[1] + 2.0 * robot.wheel_mass * axle[1]
+        loads, pulls = robot.loads(*u)[:2], robot.tractions(*u)[:2]
+        borne = {}
+        for part in (share, 1.0):
+            left_over = robot.slip_margins(*u, 1.0, share=part)
+            both = (np.array(loads) - left_over) ** 2 - np.array(pulls) ** 2
+            borne[part] = float(np.sqrt(np.maximum(both, 0.0)).sum())
+        assert borne[share] == pytest.approx(abs(aside), abs=1e-3)
+        assert borne[1.0] == pytest.approx(2.0 * abs(aside), abs=1e-3)
+        worst = max(worst, borne[1.0] - abs(aside))
+    assert worst > 10.0
+
+
 def test_2_27_and_2_28_moments_about_the_floor():
     """Truth: moments about the axle's line on the floor, of all forces and all moving masses."""
     worst = np.zeros(2)
