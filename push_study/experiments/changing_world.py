@@ -3,6 +3,7 @@
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -203,17 +204,32 @@ def trial(task: ChangeTask) -> Row:
     return row | {"success": success, "changed_at_s": change.at}
 
 
-def conclude(options: StudyOptions, tasks: Sequence[ChangeTask], rows: list[Row]) -> None:
-    """How many end at the goal, and what it cost."""
+def statistics(rows: list[Row]) -> dict[str, Any]:
+    """By kind of change: how many end at the goal, their errors, and what it cost."""
+    found: dict[str, Any] = {}
     for kind in KINDS:
         some = [r for r in rows if r.get("kind") == kind]
         done = [r for r in some if "changed_at_s" in r]
         if not done:
             continue
-        p = 1e3 * np.array([r["position_error_m"] for r in done])
-        hits = sum(int(r["collisions"]) for r in done)
+        p = [r["position_error_m"] for r in done]
+        found[kind] = {
+            "trials": len(some),
+            "successes": sum(bool(r["success"]) for r in some),
+            "position_median_m": float(np.median(p)),
+            "position_worst_m": float(np.max(p)),
+            "new_plans": sum(int(r["replans"]) for r in done),
+            "collision_ticks": sum(int(r["collisions"]) for r in done),
+        }
+    return found
+
+
+def conclude(options: StudyOptions, tasks: Sequence[ChangeTask], rows: list[Row]) -> None:
+    """How many end at the goal, and what it cost."""
+    for kind, mine in statistics(rows).items():
         print(
-            f"{kind}: {sum(bool(r['success']) for r in some)} of {len(some)} at the goal, "
-            f"{np.median(p):.2f} mm median, {p.max():.2f} most; "
-            f"{sum(int(r['replans']) for r in done)} new plans, {hits} ticks with a collision"
+            f"{kind}: {mine['successes']} of {mine['trials']} at the goal, "
+            f"{1e3 * mine['position_median_m']:.2f} mm median, "
+            f"{1e3 * mine['position_worst_m']:.2f} most; {mine['new_plans']} new plans, "
+            f"{mine['collision_ticks']} ticks with a collision"
         )

@@ -3,6 +3,7 @@
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -123,17 +124,28 @@ def trial(task: DisplacedTask) -> Row:
     }
 
 
+def statistics(rows: list[Row]) -> dict[str, Any]:
+    """Medians of the errors over all trials, and how many new plans and collisions there were."""
+    done = [r for r in rows if "position_error_m" in r]
+    if not done:
+        return {}
+    return {
+        "position_median_m": float(np.median([r["position_error_m"] for r in done])),
+        "orientation_median_rad": float(np.median([r["orientation_error_rad"] for r in done])),
+        "new_plans": sum(int(r["replans"]) for r in done),
+        "collision_ticks": sum(int(r["collisions"]) for r in done),
+    }
+
+
 def conclude(options: StudyOptions, tasks: Sequence[DisplacedTask], rows: list[Row]) -> None:
     """How many end where they should, and what it cost."""
-    done = [r for r in rows if "position_error_m" in r]
     wins = sum(bool(r["success"]) for r in rows)
     print(f"\n{wins} of {len(rows)} within {1e3 * POSITION:.0f} mm and {ORIENTATION:g} rad")
-    if done:
-        p = 1e3 * np.array([r["position_error_m"] for r in done])
-        o = np.array([r["orientation_error_rad"] for r in done])
-        replans, hits = (sum(r[k] for r in done) for k in ("replans", "collisions"))
+    if found := statistics(rows):
+        done = [r for r in rows if "position_error_m" in r]
+        p, o = (max(r[k] for r in done) for k in ("position_error_m", "orientation_error_rad"))
         print(
-            f"position {np.median(p):.2f} mm median, {p.max():.2f} most; orientation "
-            f"{np.median(o):.4f} rad median, {o.max():.4f} most; {replans} new plans, "
-            f"{hits} collisions"
+            f"position {1e3 * found['position_median_m']:.2f} mm median, {1e3 * p:.2f} most; "
+            f"orientation {found['orientation_median_rad']:.4f} rad median, {o:.4f} most; "
+            f"{found['new_plans']} new plans, {found['collision_ticks']} collisions"
         )

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -101,6 +102,12 @@ def trial(task: RowTask) -> Row:
         "duration_s": duration,
         **drawn,
     }
+
+
+def statistics(rows: list[Row]) -> dict[str, Any]:
+    """Goals of all rows, and how many of them were missed."""
+    done = [r for r in rows if "missed" in r]
+    return {"goals": GOALS * len(done), "goals_missed": sum(int(r["missed"]) for r in done)}
 
 
 def conclude(options: StudyOptions, tasks: Sequence[RowTask], rows: list[Row]) -> None:

@@ -11,6 +11,7 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 
@@ -179,6 +180,26 @@ def _into_body(twist: Array, heading: float) -> Array:
     return np.append(se2.rotation_matrix(heading).T @ twist[:2], twist[2])
 
 
+def statistics(rows: list[Row]) -> dict[str, Any]:
+    """By model: how near the optimum is to the exhaustive grid's best, and how often the local
+    method ends at a higher cost, from the thesis's start and from random ones."""
+    found: dict[str, Any] = {}
+    for model in MODELS:
+        mine = [r for r in rows if r.get("model") == model and "cost" in r]
+        if mine:
+            found[model] = {
+                "tasks": len(mine),
+                "within": sum(bool(r["success"]) for r in mine),
+                "over_grid_worst": float(max(r["over_grid"] for r in mine)),
+                "local_misses": float(
+                    np.mean([r.get("local_over", math.inf) > WORSE for r in mine])
+                ),
+                "local_misses_random": float(np.mean([r["local_worse"] for r in mine])),
+                "random_starts": int(mine[0]["local_starts"]),
+            }
+    return found
+
+
 def conclude(options: StudyOptions, tasks: Sequence[OptimisationTask], rows: list[Row]) -> None:
     """What the optimum is worth, and how often the local method misses it."""
     print(
@@ -193,19 +214,14 @@ def conclude(options: StudyOptions, tasks: Sequence[OptimisationTask], rows: lis
                 f"{100 * r['over_grid']:14.3f} {r['margin']:11.3f} {100 * r['theta0_over']:12.1f}"
                 f"{local}"
             )
-    for model in MODELS:
-        mine = [r for r in rows if r.get("model") == model and "cost" in r]
-        if mine:
-            worst = max(r["over_grid"] for r in mine)
-            missed = np.mean([r.get("local_over", math.inf) > WORSE for r in mine])
-            share = np.mean([r["local_worse"] for r in mine])
-            print(
-                f"{model}: {sum(r['success'] for r in mine)} of {len(mine)} within "
-                f"{100 * WORSE:g} % of an exhaustive grid's best, worst {100 * worst:+.2f} %; the "
-                f"local method ends at a higher cost in {100 * missed:.0f} % from the "
-                f"thesis's start and in {100 * share:.0f} % from {mine[0]['local_starts']} random "
-                "starts"
-            )
+    for model, mine in statistics(rows).items():
+        print(
+            f"{model}: {mine['within']} of {mine['tasks']} within {100 * WORSE:g} % of an "
+            f"exhaustive grid's best, worst {100 * mine['over_grid_worst']:+.2f} %; the local "
+            f"method ends at a higher cost in {100 * mine['local_misses']:.0f} % from the "
+            f"thesis's start and in {100 * mine['local_misses_random']:.0f} % from "
+            f"{mine['random_starts']} random starts"
+        )
     for name in options.scenarios:
         found = [
             t

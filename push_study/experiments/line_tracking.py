@@ -217,26 +217,46 @@ def _follow(run: LockstepRun, scenario: Scenario, way: Trajectory, client: Actio
     return answer.result().result if ended else None
 
 
+def statistics(rows: list[Row]) -> dict[str, Any]:
+    """By variant: mean and worst final error for each offset, and the times of a solve."""
+    found: dict[str, Any] = {}
+    for variant in VARIANTS:
+        mine = [r for r in rows if r.get("variant") == variant]
+        if not mine:
+            continue
+        cell: dict[str, Any] = {
+            "solve_median_ms": float(np.median([r["solve_time_ms"] for r in mine])),
+            "solve_p99_ms": float(max(r["solve_time_p99_ms"] for r in mine)),
+        }
+        for phi in OFFSETS:
+            errors = [r["final_error_m"] for r in mine if r.get("offset_m") == phi]
+            if errors:
+                cell[f"final_error_mean_m_{phi:g}"] = float(np.mean(errors))
+                cell[f"final_error_worst_m_{phi:g}"] = float(np.max(errors))
+        found[variant] = cell
+    return found
+
+
 def conclude(options: StudyOptions, tasks: Sequence[LineTask], rows: list[Row]) -> None:
     """The table of final errors beside the thesis's, and the plots."""
+    found = statistics(rows)
     print("\nfinal average position error of the object [mm], mean (max) of the trials")
     print("phi [m]     " + "".join(f"{v:>{_COLUMN}s}" for v in VARIANTS))
     for phi in OFFSETS:
         cells = []
         for variant in VARIANTS:
-            errors = [
-                1e3 * r["final_error_m"]
-                for r in rows
-                if r.get("offset_m") == phi and r.get("variant") == variant
-            ]
-            cells.append(f"{np.mean(errors):.2f} ({np.max(errors):.2f})" if errors else "-")
+            mean, worst = (
+                1e3 * found.get(variant, {}).get(f"final_error_{name}_m_{phi:g}", np.nan)
+                for name in ("mean", "worst")
+            )
+            cells.append("-" if np.isnan(mean) else f"{mean:.2f} ({worst:.2f})")
         print(f"{phi:<12g}" + "".join(f"{c:>{_COLUMN}s}" for c in cells))
     print("thesis      " + "".join(f"{v.thesis:>{_COLUMN}s}" for v in VARIANTS.values()))
-    for variant in VARIANTS:
-        times = [r["solve_time_ms"] for r in rows if r.get("variant") == variant]
-        late = [r["solve_time_p99_ms"] for r in rows if r.get("variant") == variant]
-        if times:
-            print(f"a solve {variant}: {np.median(times):.3f} ms median, {max(late):.3f} ms p99")
+    for variant, cell in found.items():
+        print(
+            f"a solve {variant}: {cell['solve_median_ms']:.3f} ms median, "
+            f"{cell['solve_p99_ms']:.3f} ms p99"
+        )
     _plot(tasks, options.out)
 
 

@@ -5,6 +5,7 @@ import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 
@@ -121,6 +122,28 @@ def _push(task: SingleRobotTask) -> Row:
         object=np.array(trace.object[::10]),
     )
     return {"scenario": task.scenario, "seed": task.seed, **measures, **drawn}
+
+
+def statistics(rows: list[Row]) -> dict[str, Any]:
+    """By scenario: successes, mean and worst errors, mean time of a job and its ratios."""
+    found: dict[str, Any] = {}
+    for name in dict.fromkeys(r["scenario"] for r in rows):
+        mine = [r for r in rows if r["scenario"] == name]
+        cell: dict[str, Any] = {
+            "trials": len(mine),
+            "successes": sum(bool(r["success"]) for r in mine),
+        }
+        for measure in ("position_error_m", "orientation_error_rad"):
+            values = [r[measure] for r in mine if measure in r]
+            if values:
+                cell[f"{measure}_mean"] = float(np.mean(values))
+                cell[f"{measure}_worst"] = float(np.max(values))
+        for measure in ("job_time_s", "time_ratio", "charged_ratio"):
+            values = [r[measure] for r in mine if measure in r]
+            if values:
+                cell[f"{measure}_mean"] = float(np.mean(values))
+        found[name] = cell
+    return found
 
 
 def conclude(options: StudyOptions, tasks: Sequence[SingleRobotTask], rows: list[Row]) -> None:

@@ -2,10 +2,10 @@
 
 from push_study.pool import Row
 from push_study.study import StudyOptions
-from push_study.swarm.map_tables import conclude, tasks_of
+from push_study.swarm.map_tables import conclude, statistics, tasks_of
 from push_study.swarm.maps import MAPS, MapTask, run
 
-__all__ = ["OPTIONS", "SCENARIOS", "conclude", "tasks", "trial"]
+__all__ = ["OPTIONS", "SCENARIOS", "conclude", "statistics", "tasks", "trial"]
 
 SCENARIOS = tuple(MAPS)
 OPTIONS = {"uncertainty": "mild", "world": "planar"}

@@ -172,24 +172,44 @@ def trial(task: ThreePushTask) -> Row:
     }
 
 
-def conclude(options: StudyOptions, tasks: Sequence[ThreePushTask], rows: list[Row]) -> None:
-    """The final errors beside the thesis's, and the ways."""
-    print("\n                       success  as planned  position [mm]  orientation [deg]", end="")
-    print("  pushes  slid [mm]")
+def statistics(rows: list[Row]) -> dict[str, Any]:
+    """By variant: how many succeeded, how many of them without a new plan, errors, pushes, and how
+    far the object slid along the bumper at most."""
+    found: dict[str, Any] = {}
     for variant in VARIANTS:
         mine = [r for r in rows if r.get("variant") == variant and "position_error_m" in r]
         if not mine:
             continue
-        p = 1e3 * np.array([r["position_error_m"] for r in mine])
-        o = np.rad2deg([r["orientation_error_rad"] for r in mine])
-        pushes = np.mean([r["pushes"] for r in mine])
-        most = 1e3 * max(r["slid_m"] for r in mine)
-        wins = sum(bool(r["success"]) for r in mine)
-        planned = sum(bool(r["success"]) and r["replans"] == 0 for r in mine)
-        n = len(mine)
+        p, o = (
+            np.array([r[name] for r in mine])
+            for name in ("position_error_m", "orientation_error_rad")
+        )
+        found[variant] = {
+            "trials": len(mine),
+            "successes": sum(bool(r["success"]) for r in mine),
+            "as_planned": sum(bool(r["success"]) and r["replans"] == 0 for r in mine),
+            "position_mean_m": float(p.mean()),
+            "position_worst_m": float(p.max()),
+            "orientation_mean_rad": float(o.mean()),
+            "orientation_worst_rad": float(o.max()),
+            "pushes_mean": float(np.mean([r["pushes"] for r in mine])),
+            "slid_worst_m": float(max(r["slid_m"] for r in mine)),
+        }
+    return found
+
+
+def conclude(options: StudyOptions, tasks: Sequence[ThreePushTask], rows: list[Row]) -> None:
+    """The final errors beside the thesis's, and the ways."""
+    print("\n                       success  as planned  position [mm]  orientation [deg]", end="")
+    print("  pushes  slid [mm]")
+    for variant, mine in statistics(rows).items():
+        n, degrees = mine["trials"], np.rad2deg
         print(
-            f"{variant:22s} {wins:3d}/{n:<3d} {planned:6d}/{n:<3d} {p.mean():7.2f} {p.max():6.2f} "
-            f"{o.mean():10.3f} {o.max():7.3f} {pushes:7.1f} {most:10.1f}"
+            f"{variant:22s} {mine['successes']:3d}/{n:<3d} {mine['as_planned']:6d}/{n:<3d} "
+            f"{1e3 * mine['position_mean_m']:7.2f} {1e3 * mine['position_worst_m']:6.2f} "
+            f"{degrees(mine['orientation_mean_rad']):10.3f} "
+            f"{degrees(mine['orientation_worst_rad']):7.3f} {mine['pushes_mean']:7.1f} "
+            f"{1e3 * mine['slid_worst_m']:10.1f}"
         )
     print(f"thesis {1e3 * THESIS[0]:41.0f} {np.rad2deg(THESIS[1]):17.1f} {3:15d}")
     _plot(tasks, options.out)

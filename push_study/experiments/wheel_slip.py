@@ -295,23 +295,51 @@ def _rms(values: Array) -> float:
     return float(np.sqrt((values**2).mean()))
 
 
+def statistics(rows: list[Row]) -> dict[str, Any]:
+    """By case: means with the constraint and without it, the part of the slip that it takes away,
+    and the ratio of the errors, of the means and as the median over the seeds."""
+    found: dict[str, Any] = {}
+    for case in CASES:
+        on, off = (
+            {r["seed"]: r for r in rows if r.get("case") == case and r.get("constraint") is held}
+            for held in (True, False)
+        )
+        pairs = [(on[seed], off[seed]) for seed in sorted(set(on) & set(off))]
+        if not pairs:
+            continue
+        slip, error = (
+            np.array([[r[name] for r in pair] for pair in pairs])
+            for name in ("slip_rms_m_s", "error_rms_m")
+        )
+        (slipped, without), (off_with, off_without) = slip.mean(axis=0), error.mean(axis=0)
+        found[f"case_{case}"] = {
+            "pairs": len(pairs),
+            "slip_with_m_s": float(slipped),
+            "slip_without_m_s": float(without),
+            "slip_removed": float(1.0 - slipped / without),
+            "error_with_m": float(off_with),
+            "error_without_m": float(off_without),
+            "error_ratio": float(off_with / off_without),
+            "error_ratio_median": float(np.median(error[:, 0] / error[:, 1])),
+        }
+    return found
+
+
 def conclude(options: StudyOptions, tasks: Sequence[SlipTask], rows: list[Row]) -> None:
     """What the constraint saves in each case, and the plots."""
     print(f"\nfrom {settled():.1f} s on, before the first bend; uncertainty: {options.uncertainty}")
-    print("                        slip rms [m/s]          saved   position error rms [m]")
-    print("                        with       without               with       without    ratio")
+    head = f"{'':22s}{'slip rms [m/s]':^22s}{'':12s}{'position error rms [m]':^25s}"
+    names = f"{'with':>9s}{'without':>13s}{'removed':>12s}{'with':>12s}{'without':>13s}"
+    print(head, f"{'':22s}{names}{'ratio':>9s}{'median ratio':>15s}", sep="\n")
+    found = statistics(rows)
     for case, name in CASES.items():
-        pair = [
-            [r for r in rows if r.get("case") == case and r.get("constraint") is constraint]
-            for constraint in (True, False)
-        ]
-        if not all(pair):
+        if (mine := found.get(f"case_{case}")) is None:
             continue
-        slip = [float(np.mean([r["slip_rms_m_s"] for r in side])) for side in pair]
-        error = [float(np.mean([r["error_rms_m"] for r in side])) for side in pair]
         print(
-            f"{name:22s}{slip[0]:9.4f}{slip[1]:13.4f}{100 * (1 - slip[0] / slip[1]):10.1f} %"
-            f"{error[0]:12.4f}{error[1]:13.4f}{error[0] / error[1]:9.2f}"
+            f"{name:22s}{mine['slip_with_m_s']:9.4f}{mine['slip_without_m_s']:13.4f}"
+            f"{100 * mine['slip_removed']:10.1f} %{mine['error_with_m']:12.4f}"
+            f"{mine['error_without_m']:13.4f}{mine['error_ratio']:9.2f}"
+            f"{mine['error_ratio_median']:15.2f}"
         )
     late = [r["solve_p99_ms"] for r in rows if r.get("constraint")]
     if late:

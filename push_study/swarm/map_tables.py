@@ -19,6 +19,7 @@ from push_model.settings import SettingsError
 from push_scenario.bodies import load_object
 from push_study.pool import Row
 from push_study.study import StudyOptions
+from push_study.summary import by_cell
 from push_study.swarm.maps import MAPS, MapTask, load_map
 
 OBJECTS = ("square", "circle", "rectangle", "triangle", "plus", "l", "h")
@@ -51,6 +52,12 @@ def tasks_of(
         for item in OBJECTS
         for k in range(options.trials)
     ]
+
+
+def statistics(rows: list[Row]) -> dict[str, float | int]:
+    """By map, object and whether headings matter: trials, successes, mean time with planning."""
+    columns = ("scenario", "object", "turned")
+    return by_cell(rows, columns, ("charged_s", "collision_ticks", "obstacle_ticks"))
 
 
 def conclude(options: StudyOptions, tasks: Sequence[MapTask], rows: list[Row]) -> None:

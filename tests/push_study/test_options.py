@@ -174,6 +174,59 @@ def test_statistics_of_grasp_selection_are_sign_tests_of_its_pairs():
     assert found["pairs_of_laws"] == 18
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_every_study_writes_what_its_rows_amount_to(name):
+    """Also where no trial came far enough to have measures."""
+    what = experiment(name)
+    assert hasattr(what, "statistics"), f"{name} prints what its summary does not have"
+    aggregate([], statistics_of(what, []))
+
+
+def test_statistics_of_wheel_slip_pair_its_seeds():
+    rows = [
+        {"case": 2, "constraint": held, "seed": seed, "slip_rms_m_s": slip, "error_rms_m": error}
+        for held, cells in (
+            (True, ((1, 0.01, 0.02), (2, 0.02, 0.03), (3, 0.03, 0.4))),
+            (False, ((1, 0.2, 0.01), (2, 0.2, 0.03), (3, 0.2, 0.5), (4, 9.0, 9.0))),
+        )
+        for seed, slip, error in cells
+    ]
+    (cell,) = experiment("wheel-slip").statistics(rows).values()
+    assert cell["pairs"] == 3 and cell["slip_removed"] == pytest.approx(0.9)
+    assert cell["error_ratio"] == pytest.approx(0.45 / 0.54)
+    assert cell["error_ratio_median"] == pytest.approx(1.0)  # of 2, 1 and 0.8
+
+
+def test_statistics_of_changed_worlds_count_what_ended_before_the_change():
+    row = {"kind": "goal", "success": True, "changed_at_s": 3.0, "replans": 2, "collisions": 0}
+    rows = [
+        row | {"position_error_m": 1e-3},
+        row | {"position_error_m": 3e-3, "collisions": 4, "success": False},
+        {"kind": "goal", "success": False},
+    ]
+    assert experiment("changing-world").statistics(rows) == {
+        "goal": {
+            "trials": 3,
+            "successes": 1,
+            "position_median_m": pytest.approx(2e-3),
+            "position_worst_m": pytest.approx(3e-3),
+            "new_plans": 4,
+            "collision_ticks": 4,
+        }
+    }
+
+
+def test_statistics_of_three_pushes_tell_planned_ends_from_others():
+    row = {"variant": "(2.57)", "success": True, "orientation_error_rad": 0.01, "pushes": 3}
+    rows = [
+        row | {"position_error_m": 1e-3, "replans": 0, "slid_m": 1e-3},
+        row | {"position_error_m": 5e-3, "replans": 1, "slid_m": 2e-2, "pushes": 5},
+    ]
+    cell = experiment("three-push").statistics(rows)["(2.57)"]
+    assert (cell["trials"], cell["successes"], cell["as_planned"]) == (2, 2, 1)
+    assert cell["slid_worst_m"] == 2e-2 and cell["pushes_mean"] == 4.0
+
+
 def test_means_by_cell_are_over_the_successes():
     rows = [
         {"law": "a", "robots": n, "success": ok, "lambda": value}
