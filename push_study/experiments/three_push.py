@@ -216,7 +216,9 @@ def conclude(options: StudyOptions, tasks: Sequence[ThreePushTask], rows: list[R
 
 
 def _plot(tasks: Sequence[ThreePushTask], out: Path) -> None:
-    figure, axes = plt.subplots(len(VARIANTS), 1, figsize=(8, 9), squeeze=False)
+    figure, axes = plt.subplots(
+        len(VARIANTS), 1, figsize=(8, 11), squeeze=False, layout="constrained", sharex=True
+    )
     for row, variant in zip(axes[:, 0], VARIANTS, strict=True):
         for task in (t for t in tasks if t.variant == variant and t.trace_file.is_file()):
             scenario = load_scenario(task.scenario)
@@ -231,5 +233,6 @@ def _plot(tasks: Sequence[ThreePushTask], out: Path) -> None:
                 row.fill(*goal.T, fill=False, lw=1.4, color="#d8b400")
         row.set_aspect("equal")
         row.set_title(f"{variant} (red: object, blue: robot)", fontsize=8)
-    figure.savefig(out / "three-push.png", dpi=130, bbox_inches="tight")
+    axes[-1, 0].set_xlabel("x [m]")
+    figure.savefig(out / "three-push.png", dpi=110)
     plt.close(figure)
