@@ -195,7 +195,8 @@ def test_the_constraint_decides_whether_three_pushes_are_enough(tmp_path, capsys
         rows[variant] = three_push.trial(task)
         tasks.append(task)
     held, lost = rows.values()
-    assert held["success"] and held["offset_m"] == lost["offset_m"] == pytest.approx(0.06)
+    assert held["success"]
+    assert (held["offset_m"], lost["offset_m"]) == pytest.approx((0.06, 0.06))
     assert held["pushes"] == 3 and held["replans"] == held["contact_losses"] == 0, held
     assert held["position_error_m"] < 0.04 and held["orientation_error_rad"] < np.deg2rad(1.8)
     assert held["slid_m"] < 0.005, held
