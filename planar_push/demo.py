@@ -85,9 +85,10 @@ def run(arguments: argparse.Namespace) -> int:
     results = {}
     try:
         with suite:
-            for team, goal in goals.items():
-                print(f"goal: {goal} on {suite.monitor(team).goal_topic}", flush=True)
-            results = suite.reach_all(goals, timeout=arguments.timeout)
+            for team, row in goals.items():
+                told = ", then ".join(str(goal) for goal in row)
+                print(f"goal: {told} on {suite.monitor(team).goal_topic}", flush=True)
+            results = suite.reach_all(timeout=arguments.timeout)
     except SuiteFailed as error:
         if not suite.stop_requested:
             print(f"error: {error}", file=sys.stderr)

@@ -72,6 +72,8 @@ def _what_next(setup: "SuiteSetup") -> str:
     words = f" --namespace {setup.namespace}" if setup.namespace else ""
     if any(node.kind == "rearranger" for node in setup.nodes):
         return f"bring all objects to their places with: planar-push rearrange{words}"
-    team = teams_of(setup.scenario)[0].name
-    words += f" --team {team}" if team else ""
+    team, *_ = teams_of(setup.scenario)
+    if team.trajectory and any(node.kind == "group" for node in setup.nodes):
+        return f"send the trajectory with: python examples/push_along_a_trajectory.py {team.name}"
+    words += f" --team {team.name}" if team.name else ""
     return f"send a goal with: planar-push goal X Y THETA{words}"

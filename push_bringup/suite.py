@@ -174,39 +174,58 @@ class Suite:
     def reach_all(
         self, goals: Mapping[str, Pose] | None = None, *, timeout: float = 300.0
     ) -> dict[str, JobResult]:
-        """Send goals to several teams at once; default: each team's goal of the scenario."""
-        if goals is None:
-            goals = scenario_goals(self.scenario)
-        waiting = {self.monitor(name).team: goal for name, goal in goals.items()}
+        """Send goals to several teams at once; default: the scenario's, each team's in a row.
+
+        timeout: [s] of wall time for each goal. The result of a team is that of its last goal, or
+        of the first one that is not reached.
+        """
+        rows = (
+            scenario_goals(self.scenario) if goals is None else {n: (g,) for n, g in goals.items()}
+        )
+        ahead = {self.monitor(name).team: list(row) for name, row in rows.items()}
         results: dict[str, JobResult] = {}
-        for name, goal in waiting.items():
-            self._monitors[name].send_goal(goal)
-        end = time.monotonic() + timeout
-        while len(results) < len(waiting):
-            why = "" if self._alive() else "the suite was stopped before the job ended"
-            if time.monotonic() > end:
-                why = f"the job did not end within {timeout:g} s"
-            for name in waiting.keys() - results.keys():
+        ends: dict[str, float] = {}
+
+        def send(name: str) -> None:
+            self._monitors[name].send_goal(ahead[name].pop(0))
+            ends[name] = time.monotonic() + timeout
+
+        for name in ahead:
+            send(name)
+        while len(results) < len(ahead):
+            stopped = "" if self._alive() else "the suite was stopped before the job ended"
+            for name in ahead.keys() - results.keys():
+                late = time.monotonic() > ends[name]
+                why = f"the job did not end within {timeout:g} s" if late else stopped
                 monitor = self._monitors[name]
                 monitor.spin(0.02)
                 result = monitor.poll() or (monitor.unfinished(why) if why else None)
-                if result is not None:
+                if result is None:
+                    continue
+                if result.success and ahead[name] and not stopped:
+                    send(name)
+                else:
                     results[name] = replace(result, bag=self.setup.bag)
-        return {name: results[name] for name in waiting}
+        return {name: results[name] for name in ahead}
 
 
-def scenario_goals(scenario: Scenario) -> dict[str, Pose]:
-    """The first goal of every team that has one.
+def scenario_goals(scenario: Scenario) -> dict[str, tuple[Pose, ...]]:
+    """The goals of every team that has some, in their order.
 
     Raises
     ------
     SettingsError: no team has a goal.
     """
-    goals: dict[str, Pose] = {}
+    goals: dict[str, tuple[Pose, ...]] = {}
     for team in teams_of(scenario):
-        if team.goal is not None:
-            x, y, theta = (float(v) for v in team.goal)
-            goals[team.name] = (x, y, theta)
+        if team.goals:
+            goals[team.name] = tuple((float(x), float(y), float(t)) for x, y, t in team.goals)
     if not goals:
-        raise SettingsError(f"scenario '{scenario.name}' has no goal; add 'goal' or 'goals' to it")
+        name = f"scenario '{scenario.name}'"
+        if any(team.trajectory for team in teams_of(scenario)):
+            raise SettingsError(
+                f"{name} has a trajectory and no goal; send the trajectory by the action "
+                "push_along (examples/push_along_a_trajectory.py)"
+            )
+        raise SettingsError(f"{name} has no goal; add 'goal' or 'goals' to it")
     return goals

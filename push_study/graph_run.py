@@ -287,16 +287,34 @@ class LockstepRun:
         goals: Mapping[str, Pose] | None = None,
         sim_limit: float = 300.0,
     ) -> dict[str, JobResult]:
-        """Goals of several teams at once, each team's from the scenario when they are not given.
+        """Goals of several teams at once; default: the scenario's, each team's in a row.
 
-        Errors are of the ground truth.
+        sim_limit: [s] for each goal. The result of a team is that of its last goal, or of the first
+        one that is not reached. Errors are of the ground truth.
         """
-        goals = scenario_goals(self.scenario) if goals is None else goals
-        begin = self.bridge.time
-        for name, goal in goals.items():
-            self.teams[name].send_goal(np.array(goal))
-        self.spin_until(lambda: all(self.teams[n].ended for n in goals), sim_limit)
-        return {n: self._result(n, goal, begin) for n, goal in goals.items()}
+        rows = (
+            scenario_goals(self.scenario) if goals is None else {n: (g,) for n, g in goals.items()}
+        )
+        ahead = {name: list(row) for name, row in rows.items()}
+        under_way: dict[str, tuple[Pose, float]] = {}  # and when it was sent
+        results: dict[str, JobResult] = {}
+
+        def send(name: str) -> None:
+            under_way[name] = ahead[name].pop(0), self.bridge.time
+            self.teams[name].send_goal(np.array(under_way[name][0]))
+
+        for name in ahead:
+            send(name)
+        while under_way:
+            left = min(begin for _, begin in under_way.values()) + sim_limit - self.bridge.time
+            self.spin_until(lambda: any(self.teams[n].ended for n in under_way), left)
+            for name, (goal, begin) in list(under_way.items()):
+                if self.teams[name].ended or self.bridge.time >= begin + sim_limit:
+                    results[name] = self._result(name, goal, begin)
+                    del under_way[name]
+                    if results[name].success and ahead[name]:
+                        send(name)
+        return {name: results[name] for name in ahead}
 
     def _result(self, name: str, goal: Pose, begin: float) -> JobResult:
         run = self.teams[name]

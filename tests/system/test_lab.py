@@ -83,7 +83,7 @@ def test_a_goal_is_reached_by_configuration_alone(domain, system, tmp_path):
         StandIn(SYSTEMS[system], tmp_path) as lab,
         Suite(str(lab.scenario), system=system) as suite,
     ):
-        goal = scenario_goals(suite.scenario)[""]
+        goal = scenario_goals(suite.scenario)[""][0]
         result = suite.reach(*goal, timeout=240.0)
     assert result.success and result.position_error <= 0.005, result
 
@@ -92,7 +92,7 @@ def drive(suite, cameras):
     """Send the goal, and wait until the robot has moved."""
     monitor = suite.monitor()
     start = cameras.poses["epuck1"]
-    monitor.send_goal(scenario_goals(suite.scenario)[""])
+    monitor.send_goal(scenario_goals(suite.scenario)[""][0])
     assert monitor.wait(60.0, lambda: np.hypot(*(cameras.poses["epuck1"] - start)[:2]) > 0.05)
 
 

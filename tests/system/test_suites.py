@@ -3,8 +3,10 @@
 import contextlib
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import rclpy
 from rclpy.signals import SignalHandlerOptions
@@ -16,6 +18,7 @@ from push_bringup.suite import Suite
 from push_model.jobs import JobError
 from push_record.bag import read_bag
 from push_record.contents import load
+from push_scenario.scenario import load_scenario
 from push_view.report import final_error
 from tests.system.processes import command
 
@@ -166,6 +169,38 @@ def test_examples(domain, words):
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert "NONE: the goal is reached" in done.stdout
+
+
+@pytest.mark.long
+def test_a_suite_goes_through_all_goals_of_its_scenario(domain):
+    scenario = load_scenario("short").settings("bridge", real_time_factor=3.0)
+    goals = (0.0, 0.02, 0.0), (0.3, -0.02, -0.1)
+    events = []
+    given = replace(scenario, goals=tuple(np.array(goal) for goal in goals))
+    with Suite(given, on_event=events.append) as suite:
+        (result,) = suite.reach_all().values()
+    assert result.success and result.goal == goals[1] and result.position_error < 0.02
+    assert [e.state for e in events if e.kind == "state"].count("idle") == 2
+
+
+@pytest.mark.long
+def test_the_example_pushes_along_the_trajectory_of_a_scenario(domain):
+    launched = command("launch", "group", "--scenario", "group-trajectory", stdout=subprocess.PIPE)
+    try:
+        assert "examples/push_along_a_trajectory.py" in launched.stdout.readline()
+        done = subprocess.run(
+            [sys.executable, str(ROOT / "examples" / "push_along_a_trajectory.py")],
+            cwd=ROOT,
+            env=Launcher([])._environment | {"PYTHONPATH": str(ROOT)},
+            capture_output=True,
+            text=True,
+            timeout=400,
+            check=False,
+        )
+    finally:
+        launched.terminate()
+        launched.wait(20)
+    assert done.returncode == 0 and done.stdout.startswith("0: at its end"), done.stdout
 
 
 @pytest.mark.long
