@@ -319,6 +319,11 @@ def nodes_of(system: str, scenario: Scenario, namespace: str = "") -> tuple[Node
     """
     found = system_of(system)
     check_namespace(namespace)
+    if system != "group" and any(team.trajectory for team in teams_of(scenario)):
+        raise SettingsError(
+            f"scenario '{scenario.name}' has a trajectory, which only the system 'group' follows; "
+            f"give '{system}' a 'goal' or 'goals', or none"
+        )
     return found.nodes(scenario, namespace)
 
 

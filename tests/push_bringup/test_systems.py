@@ -236,3 +236,11 @@ def test_a_group_has_an_optimizer_and_one_node_for_all_its_robots():
 def test_what_is_no_group_is_refused_with_the_reason(changes, why):
     with pytest.raises(SettingsError, match=why):
         nodes_of("group", group_values(**changes))
+
+
+@pytest.mark.parametrize("system", ["swarm", "own-sensing"])
+def test_a_trajectory_that_nothing_would_follow_is_refused(system):
+    scenario = load_scenario("group-trajectory")
+    assert nodes_of("group", scenario)
+    with pytest.raises(SettingsError, match="a trajectory, which only the system 'group' follows"):
+        nodes_of(system, scenario)
