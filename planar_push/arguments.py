@@ -79,9 +79,11 @@ def add_factor(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_timeout(parser: argparse.ArgumentParser, default: float) -> None:
+def add_timeout(
+    parser: argparse.ArgumentParser, default: float, words: str = "[s] wall time to wait"
+) -> None:
     """``--timeout``."""
-    parser.add_argument("--timeout", type=positive, default=default, help="[s] wall time to wait")
+    parser.add_argument("--timeout", type=positive, default=default, help=words)
 
 
 def add_study(parser: argparse.ArgumentParser) -> None:

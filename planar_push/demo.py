@@ -31,7 +31,7 @@ _OTHERS = {
     "rearrange": "start it with 'planar-push launch rearrange', then run 'planar-push rearrange'",
     "torque": "start it with 'planar-push launch torque', and send a trajectory (docs/torque.md)",
 }
-"""Systems that take no single goal of an object, and what to do instead."""
+"""Systems that take no goal of one object, and what to do instead."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -47,7 +47,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--seed", type=whole(0), default=None, help="of the simulation; default: the scenario's"
     )
     add_factor(parser)
-    add_timeout(parser, 220.0)
+    words = "[s] to wait for each goal: of wall time, or with --lockstep of simulated time"
+    add_timeout(parser, 220.0, words)
     add_namespace(parser)
 
 
