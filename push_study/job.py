@@ -4,6 +4,7 @@ import hashlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from push_model.settings import SettingsError
 from push_planner import DistanceField, PlannerSettings, PushScene
 from push_scenario.scenario import Scenario
 from push_study.graph_run import LockstepRun
@@ -20,6 +21,16 @@ SUCCESS_ORIENTATION = 0.1
 def digest(scenario: Scenario) -> str:
     """Of a scenario's text, for tasks: a changed scenario is another task."""
     return hashlib.sha256(scenario.text.encode()).hexdigest()[:16]
+
+
+def check_goal(scenario: Scenario) -> None:
+    """Raise SettingsError for a scenario without a goal, or with several: a job has one."""
+    if scenario.goal is None:
+        raise SettingsError(f"scenario '{scenario.name}' has no goal")
+    if len(scenario.goals) > 1:
+        raise SettingsError(
+            f"scenario '{scenario.name}' has {len(scenario.goals)} goals; this study takes one"
+        )
 
 
 def min_clearance(scenario: Scenario, trace: Trace) -> float:

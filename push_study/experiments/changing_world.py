@@ -20,7 +20,7 @@ from push_scenario.footing import Footing
 from push_scenario.scenario import Scenario, load_scenario
 from push_study.experiments.single_robot import SCENARIOS as NINE
 from push_study.graph_run import LockstepRun
-from push_study.job import SUCCESS_ORIENTATION, SUCCESS_POSITION, digest, run_job
+from push_study.job import SUCCESS_ORIENTATION, SUCCESS_POSITION, check_goal, digest, run_job
 from push_study.observer import final_errors
 from push_study.pool import Row
 from push_study.study import StudyOptions
@@ -62,8 +62,9 @@ def tasks(options: StudyOptions) -> list[ChangeTask]:
     made = []
     for name in options.scenarios:
         scenario = load_scenario(name)
-        if scenario.goal is None or len(scenario.robots) != 1 or len(scenario.objects) != 1:
-            raise SettingsError(f"scenario '{name}' needs a goal, one robot and one object")
+        check_goal(scenario)
+        if len(scenario.robots) != 1 or len(scenario.objects) != 1:
+            raise SettingsError(f"scenario '{name}' needs one robot and one object")
         text = digest(scenario)
         made += [
             ChangeTask(name, seed, str(options.out), kind, options.uncertainty, text)

@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 
 from push_model.arrays import Array
-from push_model.settings import SettingsError
 from push_ros.claims import own_domain
 from push_scenario.events import Displace
 from push_scenario.footing import Footing
 from push_scenario.scenario import Scenario, load_scenario
 from push_study.experiments.single_robot import SCENARIOS as NINE
 from push_study.graph_run import LockstepRun
-from push_study.job import digest, run_job
+from push_study.job import check_goal, digest, run_job
 from push_study.pool import Row
 from push_study.study import StudyOptions
 from push_study.uncertainty import uncertainty
@@ -50,8 +49,7 @@ def tasks(options: StudyOptions) -> list[DisplacedTask]:
     made = []
     for name in options.scenarios:
         scenario = load_scenario(name)
-        if scenario.goal is None:
-            raise SettingsError(f"scenario '{name}' has no goal")
+        check_goal(scenario)
         text = digest(scenario)
         made += [
             DisplacedTask(name, seed, str(options.out), options.uncertainty, text)

@@ -19,7 +19,7 @@ from push_model.arrays import Array
 from push_model.settings import SettingsError
 from push_ros.claims import own_domain
 from push_scenario.scenario import Scenario, load_scenario
-from push_study.job import digest, run_job
+from push_study.job import check_goal, digest, run_job
 from push_study.job_time import STATES
 from push_study.pool import Row
 from push_study.study import StudyOptions
@@ -61,8 +61,7 @@ def tasks(options: StudyOptions) -> list[SingleRobotTask]:
     level = uncertainty(options.uncertainty)
     for name in options.scenarios:
         scenario = load_scenario(name)
-        if scenario.goal is None:
-            raise SettingsError(f"scenario '{name}' has no goal")
+        check_goal(scenario)
         try:
             level.draw(scenario, options.seed)
         except SettingsError as error:

@@ -24,13 +24,12 @@ import numpy as np
 
 from push_model import se2
 from push_model.arrays import Array
-from push_model.settings import SettingsError
 from push_mpc.contact_force_mpc import PRINTED_GAINS
 from push_ros.claims import own_domain
 from push_scenario.events import Displace
 from push_scenario.scenario import Scenario, load_scenario
 from push_study.graph_run import LockstepRun
-from push_study.job import digest, run_job
+from push_study.job import check_goal, digest, run_job
 from push_study.pool import Row
 from push_study.study import StudyOptions
 from push_study.uncertainty import uncertainty
@@ -84,8 +83,7 @@ def tasks(options: StudyOptions) -> list[ThreePushTask]:
     made = []
     for name in options.scenarios:
         scenario = load_scenario(name)
-        if scenario.goal is None:
-            raise SettingsError(f"scenario '{name}' has no goal")
+        check_goal(scenario)
         text = digest(scenario)
         made += [
             ThreePushTask(name, seed, str(options.out), variant, options.uncertainty, text)

@@ -2,12 +2,14 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from push_bringup.node_settings import resolved
 from push_model import se2
+from push_model.settings import SettingsError
 from push_mpc import ContactForceSettings
 from push_mpc.contact_force_mpc import PRINTED_GAINS
 from push_planner import DistanceField, PlannerSettings, PushPlanner, PushScene, push_sides
@@ -20,7 +22,9 @@ from push_study.experiments import (
     line_tracking,
     three_push,
 )
-from push_study.study import StudyOptions, run_study
+from push_study.study import StudyOptions, experiment, run_study
+
+SCENARIOS = Path(__file__).parents[2] / "config" / "scenarios"
 
 
 def tracked(tmp_path, offset, variant, uncertainty="mild", length=1.5):
@@ -120,6 +124,16 @@ def test_a_scenario_without_a_goal_is_refused(tmp_path, capsys):
     assert main(words) == 2
     assert "'line' has no goal" in capsys.readouterr().err
     assert not (tmp_path / "o").exists()
+
+
+@pytest.mark.parametrize("name", ["single-robot", "displaced", "three-push", "changing-world"])
+def test_a_scenario_with_several_goals_is_refused(tmp_path, name):
+    """A trial is one job; the further goals would not be used."""
+    text = (SCENARIOS / "short.yaml").read_text()
+    file = tmp_path / "two.yaml"
+    file.write_text(text.replace("goal: [0.1, 0.04, 0.1]", "goals: [[0.1, 0, 0], [0.3, 0, 0]]"))
+    with pytest.raises(SettingsError, match="2 goals; this study takes one"):
+        experiment(name).tasks(StudyOptions((str(file),), 1, 1, tmp_path))
 
 
 def test_uncertainty_is_part_of_what_a_study_is(tmp_path):
