@@ -59,8 +59,8 @@ def test_the_printed_gains_are_those_of_the_thesis_and_reach_the_controller(tmp_
     assert settings.terminal_factor == 50.0 and settings.force_weight == 0.001
     assert settings.input_weight == settings.input_rate_weight == (0.1, 0.1)
     assert settings.state_weight != ContactForceSettings().state_weight
-    for experiment in (line_tracking, three_push):
-        names = [v for v in experiment.VARIANTS if "printed gains" in v]
+    for study in (line_tracking, three_push):
+        names = [v for v in study.VARIANTS if "printed gains" in v]
         assert len(names) == 2  # with the constraint and without
         assert {v.replace("printed", "our") for v in names} < set(experiment.VARIANTS)
     believed, *_ = line_tracking.world_of(
