@@ -62,7 +62,7 @@ def test_the_printed_gains_are_those_of_the_thesis_and_reach_the_controller(tmp_
     for study in (line_tracking, three_push):
         names = [v for v in study.VARIANTS if "printed gains" in v]
         assert len(names) == 2  # with the constraint and without
-        assert {v.replace("printed", "our") for v in names} < set(experiment.VARIANTS)
+        assert {v.replace("printed", "our") for v in names} < set(study.VARIANTS)
     believed, *_ = line_tracking.world_of(
         line_tracking.LineTask("line", 1, str(tmp_path), 0.2, "none, printed gains")
     )
