@@ -1,7 +1,8 @@
 """Have a group push its object along the trajectory of its scenario.
 
-``push_along_a_trajectory.py [TEAM]`` while ``planar-push launch group --scenario group-trajectory``
-runs. Between the poses of the scenario, the object follows a spline that begins and ends at rest.
+``push_along_a_trajectory.py [TEAM [NAMESPACE]]`` runs beside
+``planar-push launch group --scenario group-trajectory``. Between the poses of the scenario, the
+object follows a spline that begins and ends at rest.
 """
 
 import sys
@@ -10,20 +11,21 @@ import numpy as np
 from rclpy.action import ActionClient
 from scipy.interpolate import CubicSpline
 
-from push_bringup.systems import teams_of
+from push_bringup.systems import team_space, teams_of
 from push_msgs.action import PushAlong
 from push_record.recorder import heard_scenario
 from push_ros.latched import visitor
-from push_ros.names import Names
+from push_ros.names import Names, space
 
 STEP = 0.1  # [s] between samples
 
 
-def main(name: str = "") -> bool:
+def main(name: str = "", namespace: str = "") -> bool:
     """Whether the object was pushed along the trajectory to its end."""
-    team = {team.name: team for team in teams_of(heard_scenario())}[name]
-    if not team.trajectory:
-        print("the scenario has no trajectory")
+    teams = {team.name: team for team in teams_of(heard_scenario(namespace))}
+    team = teams.get(name)
+    if team is None or not team.trajectory:
+        print(f"no trajectory of a team '{name}'; the teams: {', '.join(teams)}")
         return False
     times = [point.at - team.trajectory[0].at for point in team.trajectory]
     poses = np.array([point.pose for point in team.trajectory])
@@ -32,7 +34,7 @@ def main(name: str = "") -> bool:
     x, y, theta = CubicSpline(times, poses, bc_type="clamped")(time).T
     goal = PushAlong.Goal(time=list(time), x=list(x), y=list(y), theta=list(theta))
     with visitor() as (node, spinner):
-        topic = Names("/", f"/{name}").team("push_along")
+        topic = Names("/", space(team_space(namespace, name))).team("push_along")
         client = ActionClient(node, PushAlong, topic)
         if not spinner.until(client.server_is_ready, 20.0):
             print(f"no node serves {topic}; is the system 'group' running?")

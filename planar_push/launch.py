@@ -74,6 +74,8 @@ def _what_next(setup: "SuiteSetup") -> str:
         return f"bring all objects to their places with: planar-push rearrange{words}"
     team, *_ = teams_of(setup.scenario)
     if team.trajectory and any(node.kind == "group" for node in setup.nodes):
-        return f"send the trajectory with: python examples/push_along_a_trajectory.py {team.name}"
+        script = "python examples/push_along_a_trajectory.py"
+        given = [team.name or "''", setup.namespace] if setup.namespace else [team.name]
+        return " ".join(["send the trajectory with:", script, *given]).rstrip()
     words += f" --team {team.name}" if team.name else ""
     return f"send a goal with: planar-push goal X Y THETA{words}"

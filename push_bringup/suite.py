@@ -179,9 +179,7 @@ class Suite:
         timeout: [s] of wall time for each goal. The result of a team is that of its last goal, or
         of the first one that is not reached.
         """
-        rows = (
-            scenario_goals(self.scenario) if goals is None else {n: (g,) for n, g in goals.items()}
-        )
+        rows = rows_of(goals, self.scenario)
         ahead = {self.monitor(name).team: list(row) for name, row in rows.items()}
         results: dict[str, JobResult] = {}
         ends: dict[str, float] = {}
@@ -207,6 +205,11 @@ class Suite:
                 else:
                     results[name] = replace(result, bag=self.setup.bag)
         return {name: results[name] for name in ahead}
+
+
+def rows_of(goals: Mapping[str, Pose] | None, scenario: Scenario) -> dict[str, tuple[Pose, ...]]:
+    """Goals [m, m, rad] in a row by team: one each that is given, or those of the scenario."""
+    return scenario_goals(scenario) if goals is None else {n: (g,) for n, g in goals.items()}
 
 
 def scenario_goals(scenario: Scenario) -> dict[str, tuple[Pose, ...]]:

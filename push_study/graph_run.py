@@ -18,7 +18,7 @@ from push_bringup.job_result import JobResult, result_of
 from push_bringup.monitor import Pose
 from push_bringup.node_kinds import NodeSpec
 from push_bringup.node_settings import changed, resolved
-from push_bringup.suite import scenario_goals
+from push_bringup.suite import rows_of
 from push_bringup.systems import LOCKSTEP, nodes_of, teams_of
 from push_model.arrays import Array
 from push_model.jobs import JobError
@@ -292,10 +292,7 @@ class LockstepRun:
         sim_limit: [s] for each goal. The result of a team is that of its last goal, or of the first
         one that is not reached. Errors are of the ground truth.
         """
-        rows = (
-            scenario_goals(self.scenario) if goals is None else {n: (g,) for n, g in goals.items()}
-        )
-        ahead = {name: list(row) for name, row in rows.items()}
+        ahead = {name: list(row) for name, row in rows_of(goals, self.scenario).items()}
         under_way: dict[str, tuple[Pose, float]] = {}  # and when it was sent
         results: dict[str, JobResult] = {}
 

@@ -94,6 +94,7 @@ def trial(task: RowTask) -> Row:
         "seed": task.seed,
         "success": not missed and collisions == 0,
         "reason": "; ".join(missed) or f"all {task.goals} goals",
+        "sent": task.goals,
         "missed": len(missed),
         "position_error_m": float(np.max(positions)),
         "orientation_error_rad": float(np.max(orientations)),
@@ -107,14 +108,14 @@ def trial(task: RowTask) -> Row:
 def statistics(rows: list[Row]) -> dict[str, Any]:
     """Goals of all rows, and how many of them were missed."""
     done = [r for r in rows if "missed" in r]
-    return {"goals": GOALS * len(done), "goals_missed": sum(int(r["missed"]) for r in done)}
+    return {f"goals_{name}": sum(int(r[name]) for r in done) for name in ("sent", "missed")}
 
 
 def conclude(options: StudyOptions, tasks: Sequence[RowTask], rows: list[Row]) -> None:
     """The worst of each row."""
     for row in (r for r in rows if "missed" in r):
         print(
-            f"\nseed {row['seed']}: {row['missed']} of {GOALS} goals missed; median "
+            f"\nseed {row['seed']}: {row['missed']} of {row['sent']} goals missed; median "
             f"{1e3 * row['position_median_m']:.2f} mm, most "
             f"{1e3 * row['position_error_m']:.2f} mm, {row['orientation_error_rad']:.4f} rad; "
             f"{row['collisions']} collisions, {row['duration_s']:.0f} s"

@@ -216,6 +216,12 @@ def test_statistics_of_changed_worlds_count_what_ended_before_the_change():
     }
 
 
+def test_statistics_of_goals_in_a_row_count_the_goals_that_were_sent():
+    rows = [{"sent": 56, "missed": 1}, {"sent": 3, "missed": 0}, {"success": False}]
+    found = experiment("goals-in-a-row").statistics(rows)
+    assert found == {"goals_sent": 59, "goals_missed": 1}
+
+
 def test_statistics_of_three_pushes_tell_planned_ends_from_others():
     row = {"variant": "(2.57)", "success": True, "orientation_error_rad": 0.01, "pushes": 3}
     rows = [

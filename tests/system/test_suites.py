@@ -148,6 +148,30 @@ def test_two_suites_in_two_namespaces_of_one_domain(domain, tmp_path):
         assert final_error(contents, contents.jobs[f"/{name}/"]).position < 0.02
 
 
+def example(name, *words, limit=300.0):
+    """Run a script of the folder ``examples`` to its end; limit: [s] of wall time."""
+    return subprocess.run(
+        [sys.executable, str(ROOT / "examples" / name), *words],
+        cwd=ROOT,
+        env=Launcher([])._environment | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=limit,
+        check=False,
+    )
+
+
+@contextlib.contextmanager
+def launched(*words):
+    """A suite of ``planar-push launch`` with its first line of output."""
+    process = command("launch", *words, stdout=subprocess.PIPE)
+    try:
+        yield process.stdout.readline()
+    finally:
+        process.terminate()
+        process.wait(20)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize(
     "words",
@@ -158,15 +182,7 @@ def test_two_suites_in_two_namespaces_of_one_domain(domain, tmp_path):
     ],
 )
 def test_examples(domain, words):
-    done = subprocess.run(
-        [sys.executable, str(ROOT / "examples" / words[0]), *words[1:]],
-        cwd=ROOT,
-        env=Launcher([])._environment | {"PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
+    done = example(*words)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "NONE: the goal is reached" in done.stdout
 
@@ -185,39 +201,15 @@ def test_a_suite_goes_through_all_goals_of_its_scenario(domain):
 
 @pytest.mark.long
 def test_the_example_pushes_along_the_trajectory_of_a_scenario(domain):
-    launched = command("launch", "group", "--scenario", "group-trajectory", stdout=subprocess.PIPE)
-    try:
-        assert "examples/push_along_a_trajectory.py" in launched.stdout.readline()
-        done = subprocess.run(
-            [sys.executable, str(ROOT / "examples" / "push_along_a_trajectory.py")],
-            cwd=ROOT,
-            env=Launcher([])._environment | {"PYTHONPATH": str(ROOT)},
-            capture_output=True,
-            text=True,
-            timeout=400,
-            check=False,
-        )
-    finally:
-        launched.terminate()
-        launched.wait(20)
+    with launched("group", "--scenario", "group-trajectory") as told:
+        assert "examples/push_along_a_trajectory.py" in told
+        done = example("push_along_a_trajectory.py", limit=400.0)
     assert done.returncode == 0 and done.stdout.startswith("0: at its end"), done.stdout
 
 
 @pytest.mark.long
 def test_the_example_drives_a_torque_robot(domain, tmp_path):
-    launched = command("launch", "torque", "--scenario", "wheel-slip", stdout=subprocess.PIPE)
-    try:
-        assert "send trajectories to" in launched.stdout.readline()
-        done = subprocess.run(
-            [sys.executable, str(ROOT / "examples" / "follow_a_trajectory.py"), "pioneer", "0.5"],
-            cwd=ROOT,
-            env=Launcher([])._environment | {"PYTHONPATH": str(ROOT)},
-            capture_output=True,
-            text=True,
-            timeout=120,
-            check=False,
-        )
-    finally:
-        launched.terminate()
-        launched.wait(20)
+    with launched("torque", "--scenario", "wheel-slip") as told:
+        assert "send trajectories to" in told
+        done = example("follow_a_trajectory.py", "pioneer", "0.5", limit=120.0)
     assert done.returncode == 0 and done.stdout.startswith("0: at its end"), done.stdout
