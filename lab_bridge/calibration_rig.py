@@ -71,15 +71,23 @@ class LabRig:
                 break
         return self._track([s for s in observer.samples if s.arrived >= begun])
 
-    def _newest(self, body: str) -> Sample | None:
-        marker = self._mapping.markers[body]
-        return next((s for s in reversed(self._observer.samples) if s.marker == marker), None)
+    def _newest(self, body: str, oldest: float) -> Array | None:
+        """The newest pose ``(3,)`` of a body that can be used and has arrived within the last
+        ``oldest`` [s]; None where there is none."""
+        marker, since = self._mapping.markers[body], time.time() - oldest
+        for sample in reversed(self._observer.samples):
+            if sample.arrived < since:
+                return None
+            if sample.marker == marker:
+                placed = self._mapping.place(body, sample.seen)
+                if placed is not None:
+                    return placed.pose
+        return None
 
     def _unseen(self, limit: float) -> str:
-        """A body of which no pose has arrived for limit [s]; empty where there is none."""
+        """A body of which no usable pose has arrived for limit [s]; empty where there is none."""
         for body in (self._robot, self._item):
-            newest = self._newest(body)
-            if newest is None or time.time() - newest.arrived > limit:
+            if self._newest(body, limit) is None:
                 return body
         return ""
 
@@ -103,10 +111,9 @@ class LabRig:
         trouble = self._observer.robots[self._robot].trouble
         if trouble:
             self._fail(f"{self._robot}: {trouble}")
-        newest = self._newest(self._robot)
-        placed = None if newest is None else self._mapping.place(self._robot, newest.seen)
-        if placed is not None:
-            inside = (self._low <= placed.pose[:2]) & (placed.pose[:2] <= self._high)
+        pose = self._newest(self._robot, _KEPT)
+        if pose is not None:
+            inside = (self._low <= pose[:2]) & (pose[:2] <= self._high)
             if not inside.all():
                 self._fail(f"'{self._robot}' is at the edge of the map; more free floor is needed")
 

@@ -1,10 +1,10 @@
-"""Stops e-puck2 robots when the bridge has died without doing so.
+"""Stops e-puck2 robots when the program that drives them has ended without doing so.
 
 An e-puck2 goes on with its last speeds when its connection ends: the maker's firmware waits for
-the next client and keeps the motors as they are. The bridge therefore starts this small process and
-holds a pipe to it. When the pipe closes without the word "done", the guard connects to each robot
-and commands a stop. ``python -m lab_bridge.guard HOST:PORT ...`` reads the pipe from its standard
-input.
+the next client and keeps the motors as they are. A program that drives them therefore starts this
+small process and holds a pipe to it. When the pipe closes without the word "done", because the
+program was killed or could not reach a robot, the guard connects to each robot and commands a stop.
+``python -m lab_bridge.guard HOST:PORT ...`` reads the pipe from its standard input.
 """
 
 import contextlib
@@ -14,17 +14,20 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 
 from lab_bridge.epuck2_packets import encode
 
-_LIMIT = 5.0  # [s] of wall time for all robots
+_LIMIT = 30.0  # [s] of wall time, for a network that is away for a while
 _TRY = 0.5  # [s] of wall time for a connection or an answer
 _PAUSE = 0.05  # [s]
 _DONE = b"done"
+LEFT = f"the guard goes on trying for {_LIMIT:g} s; if a robot moves, switch it off"
+"""What becomes of robots that did not answer, for people."""
 
 
 class Guard:
-    """The pipe to the process, on the bridge's side."""
+    """The pipe to the process, on the side of the program that drives robots."""
 
     def __init__(self, addresses: Sequence[tuple[str, int]]) -> None:
         words = [f"{host}:{port}" for host, port in addresses]
@@ -35,13 +38,20 @@ class Guard:
         )
 
     def dismiss(self) -> None:
-        """The robots have been stopped by the bridge itself; the process ends."""
+        """All robots stand, and have said so; the process ends."""
         with contextlib.suppress(OSError, ValueError):
             assert self._process.stdin is not None
             self._process.stdin.write(_DONE)
-            self._process.stdin.close()
+        self.leave()
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(1.0)
+
+    def leave(self) -> None:
+        """The program ends, and has not heard from every robot that it stands: the process goes on
+        and stops them."""
+        with contextlib.suppress(OSError, ValueError):
+            assert self._process.stdin is not None
+            self._process.stdin.close()
 
 
 def stop(address: tuple[str, int]) -> bool:
@@ -62,12 +72,23 @@ def main(words: Sequence[str] | None = None) -> int:
     given = sys.argv[1:] if words is None else words
     if sys.stdin.buffer.read().endswith(_DONE):
         return 0
-    waiting = [(host, int(port)) for host, _, port in (w.rpartition(":") for w in given)]
+    robots = [(host, int(port)) for host, _, port in (w.rpartition(":") for w in given)]
+    with ThreadPoolExecutor(len(robots)) as pool:  # an absent robot must not delay the others
+        stopped = list(pool.map(_stop_in_time, robots))
+    for (host, port), done in zip(robots, stopped, strict=True):
+        if not done:
+            text = f"the e-puck2 at {host}:{port} was not reached and may still move: switch it off"
+            print(text, file=sys.stderr, flush=True)
+    return 0 if all(stopped) else 1
+
+
+def _stop_in_time(address: tuple[str, int]) -> bool:
     end = time.monotonic() + _LIMIT
-    while waiting and time.monotonic() < end:
-        waiting = [address for address in waiting if not stop(address)]
+    while not stop(address):
+        if time.monotonic() > end:
+            return False
         time.sleep(_PAUSE)
-    return 1 if waiting else 0
+    return True
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 and how they move. It uses the drivers of the scenario, without the bridge."""
 
 import os
+import sys
 import time
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
@@ -11,6 +12,7 @@ import numpy as np
 from rclpy.node import Node
 
 from lab_bridge.capture_diagnosis import CaptureFacts, Sample
+from lab_bridge.guard import LEFT, Guard
 from lab_bridge.marker_mapping import Marker, MarkerMapping
 from lab_bridge.pose_drivers import PoseHost, make_pose_driver
 from lab_bridge.robot_diagnosis import DriveTest
@@ -50,6 +52,7 @@ class Observer:
         self.samples: list[Sample] = []
         self.troubles: list[str] = []
         self.robots: dict[str, RobotDriver] = {}
+        self._guard: Guard | None = None
         host = PoseHost(node, self, tuple(self._mapping.bodies))
         self._source = make_pose_driver(host, self.lab.poses)
 
@@ -57,8 +60,7 @@ class Observer:
 
     def part(self, marker: str, seen: Marker, stamp: float | None) -> None:
         """See PoseSink."""
-        if len(self.samples) < _KEPT:
-            self.samples.append(Sample(marker, seen, stamp, time.time()))
+        self.samples.append(Sample(marker, seen, stamp, time.time()))
 
     def frame(self, seen: Any, stamp: float | None) -> None:
         """See PoseSink."""
@@ -124,13 +126,17 @@ class Observer:
     def connect(self, robots: Collection[str] | None = None) -> None:
         """Begin links to robots, to all by default; they come about while it watches."""
         lab: LabSettings = self.lab
+        addresses = []
         for robot, (spec, _) in self.scenario.robots.items():
             if robots is not None and robot not in robots:
                 continue
             host, link = RobotHost(self._node, robot, spec, 50.0), lab.robots[robot]
             if isinstance(link, EPuck2Link):
                 link = replace(link, silence=min(link.silence, _SILENCE))
+                addresses.append((link.host, link.port))
             self.robots[robot] = make_robot_driver(host, link)
+        if addresses:
+            self._guard = Guard(addresses)
 
     def link_troubles(self) -> dict[str, str]:
         """Why robots cannot be commanded, by name; empty for those that can."""
@@ -200,4 +206,12 @@ class Observer:
         self.run(0.25 if self.robots else 0.0)
         for driver in self.robots.values():
             driver.close(time.monotonic())
+        moving = [r for r, d in self.robots.items() if not getattr(d, "standing", True)]
+        if moving:
+            print(f"no answer to a stop: {', '.join(moving)}; {LEFT}", file=sys.stderr)
+        if self._guard is not None:
+            if moving:
+                self._guard.leave()
+            else:
+                self._guard.dismiss()
         self._source.close()

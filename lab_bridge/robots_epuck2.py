@@ -10,6 +10,7 @@ import contextlib
 import errno
 import math
 import socket
+from collections import deque
 
 import numpy as np
 
@@ -22,7 +23,10 @@ from push_scenario.lab import EPuck2Link
 
 _REPEAT = 0.1  # [s]
 _UNANSWERED = 3  # commands under way
-_FORGIVE = 0.15  # [s] after which an unanswered command counts as lost
+_FORGIVE = 0.25
+"""[s] after which an unanswered command counts as lost. Less than ``_UNANSWERED * _REPEAT``: else
+lost answers would hold up further commands for ever, while the last one is repeated and answered.
+"""
 _PATIENCE = 2.0  # [s] for a connection
 _AGAIN = 1.0  # [s] until the next try
 _UNDER_WAY = (errno.EINPROGRESS, errno.EALREADY, errno.EWOULDBLOCK, errno.EINTR)
@@ -56,13 +60,14 @@ class EPuck2Driver:
         self._why = f"not connected to {self._where} yet"
         self.connections = 0
         """How often it has been connected."""
+        self._moving = False
         self._forget()
 
     def _forget(self) -> None:
         self._last = np.zeros(2)  # [steps/s] left, right
         self._out = b""
         self._reader = AnswerReader()
-        self._unanswered = 0
+        self._unanswered: deque[float] = deque()  # [s] when commands under way were sent
         self._answered = False
         self._sent = self._heard = -math.inf
 
@@ -70,6 +75,11 @@ class EPuck2Driver:
     def trouble(self) -> str:
         """See RobotDriver."""
         return "" if self._connected and self._answered else self._why
+
+    @property
+    def standing(self) -> bool:
+        """Whether no motion was sent, or the robot has answered a stop after the last one."""
+        return not self._moving
 
     def steps(self, twist: Array) -> Array:
         """``(2,)`` motor speeds [steps/s], left and right, whole numbers within the limits; scaled
@@ -85,7 +95,7 @@ class EPuck2Driver:
         if self.trouble:
             return
         steps = self.steps(twist)
-        if not steps.any() or self._unanswered < _UNANSWERED:
+        if not steps.any() or len(self._unanswered) < _UNANSWERED:
             self._put(self._throttle.offer(steps, now), now)
         else:
             self._throttle.hold(steps)
@@ -105,9 +115,9 @@ class EPuck2Driver:
         if now - self._heard > self._link.silence:
             self._lose(f"{self._where} has not answered for {self._link.silence:g} s", now)
             return
-        if self._unanswered and now - self._sent > _FORGIVE:
-            self._unanswered = 0
-        due = self._throttle.due(now) if self._unanswered < _UNANSWERED else None
+        while self._unanswered and now - self._unanswered[0] > _FORGIVE:
+            self._unanswered.popleft()
+        due = self._throttle.due(now) if len(self._unanswered) < _UNANSWERED else None
         if due is None and now - self._sent > _REPEAT:
             due = self._last
         self._put(due, now)
@@ -154,9 +164,10 @@ class EPuck2Driver:
         if steps is None:
             return
         self._last, self._sent = steps, now
+        self._moving |= bool(steps.any())
         left, right = (int(s) for s in steps)
         self._out = self._out[: len(self._out) % COMMAND_LENGTH] + encode(left, right)
-        self._unanswered += 1
+        self._unanswered.append(now)
         self._flush(now)
 
     def _flush(self, now: float) -> None:
@@ -178,9 +189,12 @@ class EPuck2Driver:
                     self._lose(f"{self._where} has closed the connection", now)
                     return
                 answers = self._reader.feed(data)
-                self._unanswered = max(0, self._unanswered - answers)
+                for _ in range(min(answers, len(self._unanswered))):
+                    self._unanswered.popleft()
                 if answers:
                     self._heard, self._answered = now, True
+                    if not self._unanswered and not self._last.any():
+                        self._moving = False
         except BlockingIOError:
             return
         except OSError as error:

@@ -37,7 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
     from push_estimation.calibration_runs import Plan, Runs
     from push_estimation.intervals import TooLittle
     from push_model.bumpers import FlatBumper
-    from push_ros.claims import world_is_claimed
+    from push_ros.claims import claim_world
     from push_ros.latched import visitor
     from push_ros.names import space
     from push_scenario.scenario import load_scenario
@@ -53,7 +53,8 @@ def run(arguments: argparse.Namespace) -> int:
     out = Path(arguments.out)
     if not out.absolute().parent.is_dir():
         raise SettingsError(f"{out}: there is no folder {out.absolute().parent}")
-    if world_is_claimed(os.environ.get("ROS_DOMAIN_ID") or "0", space(arguments.namespace)):
+    claim = claim_world(os.environ.get("ROS_DOMAIN_ID") or "0", space(arguments.namespace))
+    if claim is None:
         raise DomainInUse("a suite is running; stop it before robots are driven")
     half = spec.bumper.width / 2.0 if isinstance(spec.bumper, FlatBumper) else 0.0
     plan = Plan(
@@ -66,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
         curves=arguments.curves,
         speed=min(0.11, 0.85 * spec.max_speed),
     )
-    with visitor() as (node, spinner):
+    with claim, visitor() as (node, spinner):
         observer = Observer(node, spinner, scenario)
         try:
             observer.connect([robot])

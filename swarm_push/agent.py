@@ -95,13 +95,20 @@ class Agent:
     def pursue(self, target: Array | None) -> None:
         """Take a target ``(3,)``, or none; called at every tick, because the object may have left
         it."""
-        before, self.target = self.target, target
+        self.target = target
         if target is None:
             self.job.end(JobError.NONE, "no target")
         elif not self.job.busy:
             self.job.begin([target])
-        elif before is None or not np.array_equal(before, target, equal_nan=True):
+        elif (aim := self.job.target) is None or not np.array_equal(aim, target, equal_nan=True):
+            # Compared with the job's own, which a belief of the centre of mass shifts meanwhile.
             self.job.retarget(target)
+
+    def forget(self) -> None:
+        """Forget all neighbours and the target: the clock has been set back."""
+        self.pursue(None)
+        self._heard, self._flows, self._fresh = {}, {}, set()
+        self.mean = self._before = None
 
     def hear(self, message: AgentState) -> None:
         """Take the message of a robot; that of one beyond the radius is ignored."""

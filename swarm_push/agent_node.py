@@ -152,39 +152,44 @@ class SwarmAgentNode(Node):
     # What it does
 
     def _on_frame(self, frame: Frame) -> None:
-        twist = (0.0, 0.0)
+        twist, turn = (0.0, 0.0), 0.0
         if frame.verdict is Stamp.RESET:
             self._target, self._messages, self._told = None, [], -np.inf
             if self.agent is not None:
-                self.agent.pursue(None)
+                self.agent.forget()
         elif frame.verdict is not Stamp.REFUSED:
-            twist = self._tick(frame.stamp)
+            twist, turn = self._tick(frame.stamp)
         message = TwistStamped(header=Header(stamp=frame.stamp, frame_id="base_link"))
         if self.agent is not None and self.agent.job.holonomic:
             own = self._poses.pose(self.robot)
             turned = se2.rotation_matrix(-float(own[2])) @ twist if own is not None else twist
             message.twist.linear.x, message.twist.linear.y = (float(v) for v in turned)
-            message.twist.angular.z = float(self.agent.job.turns.get(self.robot, 0.0))
+            message.twist.angular.z = turn
         else:
             message.twist.linear.x, message.twist.angular.z = twist
         self._commands.publish(message)
 
-    def _tick(self, stamp: Any) -> tuple[float, float]:
-        """Do a step. The robot stands while its pose, that of the object or a target is missing."""
+    def _tick(self, stamp: Any) -> tuple[tuple[float, float], float]:
+        """Do a step: the twist, and the turn rate [rad/s] of a robot that moves in any direction.
+        The robot stands while its pose, that of the object or a target is missing."""
         item, own = self._poses.pose(self.object), self._poses.pose(self.robot)
         agent, now = self.agent, self._poses.stamp
-        if agent is None or item is None or own is None:
-            return 0.0, 0.0
-        # Words of this very frame come before or after it, as it happens: they count at the next.
+        # Messages of this very frame come before or after it, at random: they count at the next.
+        # Stamps far ahead are of a clock that has been set back since.
         heard = sorted((w for w in self._messages if w.time < now), key=lambda w: (w.time, w.name))
-        self._messages = [w for w in self._messages if w.time >= now]
+        latest = now + self._behaviour.forget
+        self._messages = [w for w in self._messages if now <= w.time < latest]
+        if agent is None:
+            return (0.0, 0.0), 0.0
+        agent.pursue(self._target if abs(now - self._told) < self._behaviour.silence else None)
+        if item is None or own is None:
+            return (0.0, 0.0), 0.0
         for message in heard:
             agent.hear(message)
-        agent.pursue(self._target if now - self._told < self._behaviour.silence else None)
         others = self._poses.discs(self._others)
         twist, message = agent.step(now, self._item.mass_pose(item), own, others)
         self._said.publish(agent_state_to_ros(stamp, message))
-        return twist
+        return twist, float(agent.job.turns.get(self.robot, 0.0))
 
     def _state(self) -> dict[str, Any]:
         agent = self.agent

@@ -237,3 +237,21 @@ def test_a_guard_that_is_dismissed_does_nothing(peer):
     peer.server.settimeout(0.1)
     with pytest.raises(TimeoutError):
         peer.accept()
+
+
+def test_lost_answers_do_not_hold_up_further_commands(peer):
+    """Three answers are lost; from then on every command is answered, once."""
+    made = connected(peer)
+    peer.client.settimeout(0.001)
+    turn, now, sent = np.array([0.0, 0.0, 1.0]), 0.02, []
+    for k in range(200):
+        now += 0.01
+        made.command(GO if k < 50 else turn, now)
+        made.poll(now)
+        heard = peer.heard()
+        sent += heard if k > 130 else []
+        if heard and not 40 <= k < 50:
+            peer.client.sendall(b"\x03" * len(heard))
+        time.sleep(0.001)
+    assert sent and set(sent) == {tuple(int(s) for s in made.steps(turn))}
+    made.close(now)

@@ -1,16 +1,21 @@
 """Robots that decide for themselves: what they hear, what they agree on, what they do."""
 
 import math
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from rclpy.serialization import serialize_message
 
+from push_estimation.pose_gate import Stamp
 from push_msgs.msg import SwarmAgentState, SwarmTarget
+from push_ros.pose_feed import Frame
 from push_ros.validation import InvalidMessage
 from push_scenario.bodies import load_object, load_robot
 from push_study.swarm.maps import MapTask, run
 from swarm_push.agent import Agent, AgentSettings, AgentState
+from swarm_push.agent_node import SwarmAgentNode
 from swarm_push.laws import LawSections, LawSettings
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
 from swarm_push.swarm_messages import (
@@ -159,6 +164,94 @@ def test_a_state_is_decoded_once_for_all_that_receive_it_and_none_can_alter_it()
     for wrong in (data[:9], b"\x00\x01\x00\x00" + b"\xff" * 40):
         with pytest.raises(RuntimeError):
             agent_state_from_bytes(wrong)
+
+
+def test_a_target_is_shifted_once_when_the_centre_of_mass_is_believed_elsewhere():
+    """The node shifts the target that it sends, the agent that of its job: in whatever order."""
+    for first in ("target", "belief"):
+        (agent,) = agents(1)
+        item, here = load_object("swarm_square"), np.array([-1.0, 0.0, 0.0])
+        agent.pursue(np.array([1.0, 0.0, 0.0]))
+        agent.step(0.0, np.zeros(3), here, NONE)
+        shifted = np.array([1.05, 0.0, 0.0])
+        if first == "target":
+            agent.pursue(shifted)
+        agent.job.believe(replace(item, com=(item.com[0] + 0.05, item.com[1])))
+        agent.pursue(shifted)
+        assert np.array_equal(agent.job.target, shifted)
+
+
+def test_a_clock_that_is_set_back_leaves_no_neighbours():
+    (agent,) = agents(1)
+    here, there = np.array([-1.0, 0.0, 0.0]), np.array([-1.0, 0.3, 0.0])
+    agent.pursue(np.array([1.0, 0.0, 0.0]))
+    agent.step(300.0, np.zeros(3), here, NONE)
+    agent.hear(AgentState("e1", 300.0, there, there[:2], {"e0": np.ones(2)}))
+    agent.step(300.02, np.zeros(3), here, NONE)
+    assert agent.neighbours == ("e1",)
+    agent.forget()
+    agent.step(0.0, np.zeros(3), here, NONE)
+    assert agent.neighbours == () and not agent.job.busy
+    assert np.array_equal(agent.mean, here[:2])
+
+
+class AlonePoses:
+    """What an agent's node sees: the object, and its own robot while ``own`` is set."""
+
+    def __init__(self, own):
+        self.own, self.stamp = own, 0.0
+
+    def pose(self, name):
+        return self.own if name == "e0" else np.zeros(3)
+
+    def discs(self, others):
+        return NONE
+
+
+def agent_node(agent, poses):
+    """The part of an agent's node that answers frames, without a graph."""
+    node = SwarmAgentNode.__new__(SwarmAgentNode)
+    node.robot, node.object, node._item = "e0", "plate", load_object("swarm_square")
+    node.agent, node._behaviour, node._poses = agent, agent.settings, poses
+    node._target, node._told = np.array([1.0, 0.0, 0.0]), 0.0
+    node._messages, node._others, node.sent = [], {}, []
+    node._commands = SimpleNamespace(publish=node.sent.append)
+    node._said = SimpleNamespace(publish=lambda message: None)
+    return node
+
+
+def frame(node, now, verdict=Stamp.OK):
+    node._poses.stamp = now
+    node._on_frame(Frame(STAMP, verdict, {}, 0.02))
+    twist = node.sent[-1].twist
+    return twist.linear.x, twist.linear.y, twist.angular.z
+
+
+def test_a_robot_that_is_not_seen_stands_also_while_it_is_tested():
+    """A disc that does not move is told to turn; then its pose is missing."""
+    item, robot = load_object("swarm_square"), load_robot("disc")
+    agent = Agent("e0", SwarmJob(REGION, item, robot, SwarmJobSettings()), AgentSettings())
+    node, now = agent_node(agent, AlonePoses(np.array([-1.0, 0.0, 0.0]))), 0.0
+    while not agent.job.turns and now < 30.0:
+        node._told = now = now + 0.02
+        told = frame(node, now)
+    assert told[2] != 0.0
+    assert frame(node, now + 0.01, Stamp.REFUSED) == (0.0, 0.0, 0.0)
+    node._poses.own = None
+    for _ in range(100):
+        now += 0.02
+        node._messages.append(AgentState("e1", now - 0.02, np.zeros(3), np.zeros(2), {}))
+        assert frame(node, now) == (0.0, 0.0, 0.0)
+    assert not node._messages and not agent.job.busy  # the target has been silent, too
+
+
+def test_messages_and_targets_from_before_the_clock_was_set_back_do_not_count():
+    (agent,) = agents(1)
+    node = agent_node(agent, AlonePoses(np.array([-1.0, 0.0, 0.0])))
+    node._told = 300.0
+    node._messages = [AgentState("e1", 300.0, np.zeros(3), np.zeros(2), {})]
+    assert frame(node, 0.02) == (0.0, 0.0, 0.0)
+    assert not agent.job.busy and not node._messages
 
 
 @pytest.mark.long
