@@ -22,6 +22,8 @@ _LEVEL = 0.15  # [m] greatest difference of heights on a floor
 _SLOW = 30.0  # [Hz]
 _FAR_OFF = 1.0  # [s] between the clocks
 _RECEIPT = 0.002  # [s] age of a stamp that was given on arrival
+_USABLE = 0.9  # of the poses of a body
+_TF = "tf2_msgs/msg/TFMessage"  # which several nodes may publish
 
 
 @dataclass(frozen=True)
@@ -75,12 +77,15 @@ def diagnose_capture(
     if not facts.samples:
         return found + _nothing(facts, found)
     found += _names(facts, lab, bodies)
+    found += _unusable(facts, lab, bodies)
     units = _units(facts, lab, bodies, room)
     found += units or _axes(facts, lab, bodies)
     if not any(f.weight.value == "error" for f in found):
         found += _outside(facts, lab, bodies, room)
-    found += _stamps(facts, lab)
-    found += _rate(facts)
+    seen = {s.marker for s in facts.samples}
+    markers = [lab.marker(b) for b in bodies if lab.marker(b) in seen]
+    found += _stamps(facts, lab, markers)
+    found += _rate(facts, markers)
     order = {"error": 0, "warning": 1, "fact": 2}
     return sorted(found, key=lambda f: order[f.weight.value])
 
@@ -98,7 +103,11 @@ def _publishers(facts: CaptureFacts) -> list[Finding]:
                     "set lab.poses.kind to the driver of that type",
                 )
             )
-        if right > 1:
+        if right > 1 and facts.expected == _TF:
+            text = f"{right} nodes publish on {topic}"
+            remedy = "that is right, unless two of them publish the same body"
+            found.append(warning("TWO_PUBLISHERS", text, remedy))
+        elif right > 1:
             found.append(
                 error(
                     "TWO_PUBLISHERS",
@@ -153,6 +162,19 @@ def _names(facts: CaptureFacts, lab: LabSettings, bodies: Sequence[str]) -> list
                 f"{hint}; or make the motion-capture software track the body",
             )
         )
+    return found
+
+
+def _unusable(facts: CaptureFacts, lab: LabSettings, bodies: Sequence[str]) -> list[Finding]:
+    """Bodies whose poses are not finite, or no rotation: the bridge leaves such poses out."""
+    mapping, found = MarkerMapping(lab, bodies), []
+    for body, marker in mapping.markers.items():
+        poses = [s.seen for s in facts.samples if s.marker == marker]
+        good = sum(mapping.place(body, seen) is not None for seen in poses)
+        if good < _USABLE * len(poses):
+            text = f"{len(poses) - good} of {len(poses)} poses of '{marker}' are no poses"
+            remedy = f"motion capture loses '{body}': see that its markers are visible"
+            found.append((warning if good else error)("UNUSABLE", text, remedy))
     return found
 
 
@@ -211,6 +233,9 @@ def _axes(facts: CaptureFacts, lab: LabSettings, bodies: Sequence[str]) -> list[
     if tilt < _UPRIGHT and step < _LEVEL:
         return []
     text = f"bodies are tilted by {math.degrees(tilt):.0f} degrees, heights differ by {step:.2f} m"
+    if tilt < _UPRIGHT:  # which the bridge takes
+        remedy = "right if the markers are at these heights; otherwise correct lab.axes"
+        return [warning("WRONG_AXES", text, remedy)]
     for name, axes in (*AXES.items(), ("[y, z, x]", ("y", "z", "x"))):
         t, s = _uneven(facts, replace(lab, axes=axes), bodies)
         if t < _UPRIGHT and s < _LEVEL:
@@ -242,8 +267,15 @@ def _outside(
     return found
 
 
-def _stamps(facts: CaptureFacts, lab: LabSettings) -> list[Finding]:
-    one = facts.samples[-1].marker
+def _stamps(facts: CaptureFacts, lab: LabSettings, markers: Sequence[str]) -> list[Finding]:
+    """Of all bodies what is wrong; of the first one what is right."""
+    each = [_stamps_of(marker, facts, lab) for marker in markers]
+    wrong = [f for found in each for f in found if f.weight.value != "fact"]
+    unique = {(f.code, f.what): f for f in wrong}
+    return [*unique.values(), *(f for found in each[:1] for f in found if f not in wrong)]
+
+
+def _stamps_of(one: str, facts: CaptureFacts, lab: LabSettings) -> list[Finding]:
     stamps = np.array([s.stamp for s in facts.samples if s.marker == one and s.stamp is not None])
     arrived = np.array(
         [s.arrived for s in facts.samples if s.marker == one and s.stamp is not None]
@@ -252,6 +284,8 @@ def _stamps(facts: CaptureFacts, lab: LabSettings) -> list[Finding]:
         return [fact("STAMPS", "poses have no stamps of capture; the time of arrival is used")]
     by_receipt = "use stamps of arrival: set lab.stamps: receipt"
     steps = np.diff(stamps)
+    if lab.stamps == "receipt" and (steps <= 0.0).any():
+        return [fact("STAMPS", "the stamps of motion capture are not used (lab.stamps: receipt)")]
     if len(steps) and (steps <= 0.0).mean() > 0.5:
         text = f"the stamps stand still at {stamps[-1]:.3f} s"
         return [error("STALE_CLOCK", text, f"mend the clock of the driver, or {by_receipt}")]
@@ -277,9 +311,13 @@ def _stamps(facts: CaptureFacts, lab: LabSettings) -> list[Finding]:
     return found
 
 
-def _rate(facts: CaptureFacts) -> list[Finding]:
-    one = facts.samples[-1].marker
-    arrived = np.array([s.arrived for s in facts.samples if s.marker == one])
+def _rate(facts: CaptureFacts, markers: Sequence[str]) -> list[Finding]:
+    """Of the body of which the fewest poses arrived."""
+    times = {m: [s.arrived for s in facts.samples if s.marker == m] for m in markers}
+    if not times:
+        return []
+    one = min(times, key=lambda m: len(times[m]))
+    arrived = np.array(times[one])
     if len(arrived) < 3 or arrived[-1] <= arrived[0]:
         return [
             warning("RATE", f"only {len(arrived)} poses of '{one}' arrived", "check the stream")

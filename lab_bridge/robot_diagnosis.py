@@ -11,6 +11,7 @@ from push_model.arrays import Array
 
 _MOVED = 0.3  # of the expected way
 _SCALE = 0.2  # relative error of the way that is still right
+_TURNED = 0.5  # of the angle
 _ASKEW = math.radians(12.0)
 
 
@@ -32,11 +33,11 @@ class DriveTest:
 
 @dataclass(frozen=True)
 class RobotFacts:
-    """troubles: of each link, empty where it is connected. tests: of robots that were driven. seen:
-    robots that motion capture shows."""
+    """troubles: of each link, empty where it is connected. tests: of robots that were driven; None
+    where motion capture lost the robot meanwhile. seen: robots that motion capture shows."""
 
     troubles: Mapping[str, str]
-    tests: Mapping[str, DriveTest] = field(default_factory=dict)
+    tests: Mapping[str, DriveTest | None] = field(default_factory=dict)
     seen: frozenset[str] | None = None
 
 
@@ -53,7 +54,12 @@ def diagnose_robots(facts: RobotFacts) -> list[Finding]:
             text = f"{robot} is connected, but motion capture does not show it"
             found.append(error("NOT_SEEN", text, "see planar-push doctor mocap"))
         elif robot in facts.tests:
-            found += _drive(robot, facts.tests[robot])
+            test = facts.tests[robot]
+            if test is None:
+                text = f"{robot} was driven, and motion capture lost it meanwhile"
+                found.append(error("NOT_SEEN", text, "see planar-push doctor mocap"))
+            else:
+                found += _drive(robot, test)
         else:
             found.append(fact("CONNECTED", f"{robot} answers"))
     return found
@@ -61,7 +67,8 @@ def diagnose_robots(facts: RobotFacts) -> list[Finding]:
 
 def _drive(robot: str, test: DriveTest) -> list[Finding]:
     length = float(np.hypot(*test.way[:2]))
-    if length < _MOVED * test.ahead and abs(test.turned) < _MOVED * test.turn:
+    stays, faces = length < _MOVED * test.ahead, abs(test.turned) < _MOVED * test.turn
+    if stays and faces:
         if test.others:
             text = f"{robot} was commanded, but {', '.join(test.others)} moved"
             return [error("ROBOTS_SWAPPED", text, "exchange their addresses or their names")]
@@ -72,6 +79,10 @@ def _drive(robot: str, test: DriveTest) -> list[Finding]:
                 "check its battery, its selector, and that its wheels touch the floor",
             )
         ]
+    if stays or faces:
+        text = "turns, but does not drive ahead" if stays else "drives ahead, but does not turn"
+        remedy = "check both motors, and what the driver makes of v and omega"
+        return [error("NO_MOTION", f"{robot} {text}", remedy)]
     forward = float(test.way[0]) > 0.0
     left = test.turned > 0.0
     if not forward and not left:
@@ -100,6 +111,10 @@ def _drive(robot: str, test: DriveTest) -> list[Finding]:
                 "check wheel_radius of its type, and lab.units",
             )
         ]
+    ratio_of_turn = test.turned / test.turn
+    if abs(ratio_of_turn - 1.0) > _TURNED:
+        text = f"{robot} turns {ratio_of_turn:.2f} times as far as commanded"
+        return [warning("SCALE", text, "check wheel_radius and half_track of its type")]
     return [
         fact("DRIVES", f"{robot} drives and turns as commanded ({100.0 * ratio:.0f} % of the way)")
     ]

@@ -188,9 +188,12 @@ def _lab(
         return
     troubles = observer.link_troubles()
     shown = None if wrong else frozenset(r for r in troubles if observer.pose(r) is not None)
+    if arguments.drive and wrong:
+        text = "no robot is driven, because there are errors of motion capture"
+        yield warning("NOT_DRIVEN", text, "mend them first: planar-push doctor mocap shows them")
     for robot, trouble in troubles.items():
-        test = None
+        tests = {}
         if arguments.drive and not trouble and shown is not None and robot in shown:
-            test = observer.drive_test(robot)
-        tests = {} if test is None else {robot: test}
+            tests[robot] = observer.drive_test(robot)
+            trouble = observer.robots[robot].trouble  # it may have been lost meanwhile
         yield from diagnose_robots(RobotFacts({robot: trouble}, tests, shown))

@@ -1,6 +1,7 @@
 """The rules of the doctor on made-up facts: every mistake has its name, and a good lab has none."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -130,6 +131,10 @@ def drive(x, y, dyaw, turned, others=()):
         (drive(0.0, 0.0, 0.0, 0.0), "NO_MOTION", "does not move"),
         (drive(0.0, 0.0, 0.0, 0.0, ("epuck2",)), "ROBOTS_SWAPPED", "epuck2 moved"),
         (drive(0.06, 0.0, 0.0, 0.5), "SCALE", "2.00 times"),
+        (drive(0.03, 0.0, 0.0, 1.5), "SCALE", "turns 3.00 times"),
+        (drive(0.03, 0.0, 0.0, 0.001), "NO_MOTION", "does not turn"),
+        (drive(0.03, 0.0, 0.0, -0.001), "NO_MOTION", "does not turn"),
+        (drive(0.001, 0.001, 0.0, 0.5), "NO_MOTION", "does not drive ahead"),
     ],
 )
 def test_a_drive_tells_what_is_wrong(test, code, words):
@@ -140,3 +145,54 @@ def test_a_drive_tells_what_is_wrong(test, code, words):
 def test_links():
     found = diagnose_robots(RobotFacts({"a": "no answer", "b": "", "c": ""}, {}, frozenset("b")))
     assert [f.code for f in found] == ["ROBOT_SILENT", "CONNECTED", "NOT_SEEN"]
+
+
+def swapped(observed, change, marker="Box"):
+    """Facts with some poses of a body changed."""
+    samples = [change(k, s) if s.marker == marker else s for k, s in enumerate(observed.samples)]
+    return replace(observed, samples=[s for s in samples if s is not None])
+
+
+@pytest.mark.parametrize("bad", [np.full(4, np.nan), np.zeros(4)])
+def test_poses_that_the_bridge_leaves_out_are_told(bad):
+    def spoil(k, sample):
+        return replace(sample, seen=Marker(sample.seen.position, bad))
+
+    found = diagnose_capture(swapped(facts(), spoil), lab(), BODIES, ROOM)
+    assert codes(found) == ["UNUSABLE"] and "120 of 120 poses of 'Box'" in found[0].what
+    often = swapped(facts(), lambda k, s: spoil(k, s) if k % 3 else s)
+    found = diagnose_capture(often, lab(), BODIES, ROOM)
+    assert not codes(found) and codes(found, Weight.WARNING) == ["UNUSABLE"]
+
+
+def test_every_body_is_looked_at():
+    once = swapped(facts(), lambda k, s: s if k < 2 else None)
+    (found,) = [f for f in diagnose_capture(once, lab(), BODIES, ROOM) if f.code == "RATE"]
+    assert found.weight is Weight.WARNING and "only 1 poses of 'Box'" in found.what
+    for body in ("Box", "Robot 1"):
+        still = swapped(facts(), lambda k, s: replace(s, stamp=1000.0), body)
+        assert codes(diagnose_capture(still, lab(), BODIES, ROOM)) == ["STALE_CLOCK"]
+
+
+def test_what_is_right_is_no_error():
+    """Stamps that are not used, markers at different heights, several nodes on /tf."""
+    still = swapped(facts(), lambda k, s: replace(s, stamp=0.0))
+    still = swapped(still, lambda k, s: replace(s, stamp=0.0), "Robot 1")
+    found = diagnose_capture(still, lab(stamps="receipt"), BODIES, ROOM)
+    assert not codes(found) and not codes(found, Weight.WARNING)
+
+    def lift(k, sample):
+        up = np.array([0.0, 250.0, 0.0])
+        return replace(sample, seen=Marker(sample.seen.position + up, sample.seen.quaternion))
+
+    found = diagnose_capture(swapped(facts(), lift), lab(), BODIES, ROOM)
+    assert not codes(found) and codes(found, Weight.WARNING) == ["WRONG_AXES"]
+    kind = "tf2_msgs/msg/TFMessage"
+    both = replace(facts(publishers=(kind, kind)), expected=kind)
+    found = diagnose_capture(both, lab(), BODIES, ROOM)
+    assert not codes(found) and codes(found, Weight.WARNING) == ["TWO_PUBLISHERS"]
+
+
+def test_a_robot_that_was_lost_while_it_drove_is_an_error():
+    (found,) = diagnose_robots(RobotFacts({"epuck1": ""}, {"epuck1": None}))
+    assert found.weight is Weight.ERROR and found.code == "NOT_SEEN"
