@@ -268,11 +268,11 @@ def _outside(
 
 
 def _stamps(facts: CaptureFacts, lab: LabSettings, markers: Sequence[str]) -> list[Finding]:
-    """Of all bodies what is wrong; of the first one what is right."""
+    """Of all bodies, one finding a code; what is right only of the first one."""
     each = [_stamps_of(marker, facts, lab) for marker in markers]
-    wrong = [f for found in each for f in found if f.weight.value != "fact"]
-    unique = {(f.code, f.what): f for f in wrong}
-    return [*unique.values(), *(f for found in each[:1] for f in found if f not in wrong)]
+    first = each[0] if each else []
+    further = [f for found in each[1:] for f in found if f.weight.value != "fact"]
+    return list({f.code: f for f in (*reversed(further), *first)}.values())
 
 
 def _stamps_of(one: str, facts: CaptureFacts, lab: LabSettings) -> list[Finding]:

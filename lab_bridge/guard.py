@@ -73,7 +73,9 @@ def main(words: Sequence[str] | None = None) -> int:
     if sys.stdin.buffer.read().endswith(_DONE):
         return 0
     robots = [(host, int(port)) for host, _, port in (w.rpartition(":") for w in given)]
-    with ThreadPoolExecutor(len(robots)) as pool:  # an absent robot must not delay the others
+    with ThreadPoolExecutor(
+        max(1, len(robots))
+    ) as pool:  # an absent robot must not delay the others
         stopped = list(pool.map(_stop_in_time, robots))
     for (host, port), done in zip(robots, stopped, strict=True):
         if not done:

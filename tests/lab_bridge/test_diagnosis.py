@@ -196,3 +196,10 @@ def test_what_is_right_is_no_error():
 def test_a_robot_that_was_lost_while_it_drove_is_an_error():
     (found,) = diagnose_robots(RobotFacts({"epuck1": ""}, {"epuck1": None}))
     assert found.weight is Weight.ERROR and found.code == "NOT_SEEN"
+
+
+def test_a_clock_that_is_off_is_told_once():
+    """The ages of the bodies differ by some milliseconds."""
+    late = swapped(facts(clock=-37.0), lambda k, s: replace(s, arrived=s.arrived + 0.02))
+    found = diagnose_capture(late, lab(), BODIES, ROOM)
+    assert [f.code for f in found].count("CLOCK_OFFSET") == 1
