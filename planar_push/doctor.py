@@ -4,6 +4,7 @@ import argparse
 import os
 import time
 from collections.abc import Iterator
+from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
 
 from planar_push.arguments import add_namespace, add_scenario, positive
@@ -64,9 +65,16 @@ def examine(arguments: argparse.Namespace) -> "Iterator[Finding]":
     """
     from lab_bridge.findings import error
     from lab_bridge.observation import Observer
+    from push_ros.claims import claim_world
     from push_ros.latched import visitor
+    from push_ros.names import space
 
-    with visitor() as (node, spinner):
+    # Robots are driven here as by a bridge: none may be started meanwhile.
+    domain, here = os.environ.get("ROS_DOMAIN_ID") or "0", space(arguments.namespace)
+    claim = claim_world(domain, here) if arguments.drive else nullcontext()
+    if claim is None:
+        raise SettingsError("a suite is running; stop it before robots are driven")
+    with claim, visitor() as (node, spinner):
         found, scenario, runs = _graph(arguments, node, spinner)
         yield from found
         if scenario is None:

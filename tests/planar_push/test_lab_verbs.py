@@ -35,10 +35,11 @@ def test_what_is_wrong_is_said(line, what, domain, capsys):
     assert what in capsys.readouterr().err
 
 
-def test_nothing_is_calibrated_beside_a_suite(domain, capsys):
+@pytest.mark.parametrize("line", [["calibrate"], ["doctor", "--drive"]])
+def test_no_robot_is_driven_beside_a_suite(line, domain, capsys):
     claim = claim_world(os.environ["ROS_DOMAIN_ID"], "/")
     try:
-        assert main(["calibrate", "--scenario", LAB]) == 2
+        assert main([*line, "--scenario", LAB]) == 2
     finally:
         claim.close()
     assert "a suite is running" in capsys.readouterr().err
