@@ -144,8 +144,9 @@ class SwarmMethod:
             self.job.step(seen.time, pose, seen.robots, seen.obstacles)
         )
         for name, turn in self.job.turns.items():
-            vx, vy, *_ = commands.get(name, (0.0, 0.0))
-            commands[name] = (vx, vy, turn)
+            if name in commands:  # else it is not seen, and stands
+                vx, vy, *_ = commands[name]
+                commands[name] = (vx, vy, turn)
         return Told(commands)
 
     def report(self, seen: Seen) -> Report | None:

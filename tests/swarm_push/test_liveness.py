@@ -5,7 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from push_job.method import Arena, Seen, Task
 from push_model import se2
+from push_model.belief import Belief
 from push_model.jobs import JobError
 from push_model.occupancy import rasterise
 from push_model.specs import EnvironmentSpec
@@ -18,6 +20,7 @@ from swarm_push.liveness import LivenessCheck, LivenessSettings
 from swarm_push.region import covered_region
 from swarm_push.rim import Rim
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
+from swarm_push.swarm_method import SwarmMethod
 from tests.driving import GroupWorld, drive
 from tests.samples import mostly_long
 
@@ -274,3 +277,24 @@ def test_nobody_is_sent_where_somebody_dead_stands():
             else:
                 shut += away < 1.8 * radius
     assert shut > 50  # places that would have been taken
+
+
+def test_robots_that_are_not_seen_are_not_told_to_turn():
+    """Discs that do not move are told to turn; then the poses of all of them are missing."""
+    item, disc = load_object("swarm_square"), load_robot("disc")
+    specs, belief = dict.fromkeys(NAMES, disc), Belief({"box": item}, dict.fromkeys(NAMES, disc))
+    grid = rasterise(EnvironmentSpec((6.0, 6.0)))
+    method, here = SwarmMethod(Arena(grid, specs, "box", item)), np.zeros(3)
+    method.begin(Task((np.array([1.0, 0.0, 0.0]),)), belief)
+    poses = {n: np.array([-1.0, 0.5 * k, 0.0]) for k, n in enumerate(NAMES)}
+    now, told = 0.0, {}
+    while now < 30.0 and not any(len(c) > 2 and c[2] for c in told.values()):
+        now += DT
+        told = method.step(Seen(now, here, poses), belief).commands
+    turning = [n for n, c in told.items() if len(c) > 2 and c[2]]
+    assert turning and method.job.turns.keys() == set(turning)
+    for seen in ((), poses.keys() - {turning[0]}):
+        for _ in range(50):
+            now += DT
+            told = method.step(Seen(now, here, {n: poses[n] for n in seen}), belief).commands
+            assert told.keys() <= set(seen)
