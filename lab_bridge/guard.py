@@ -13,7 +13,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 from lab_bridge.epuck2_packets import encode
@@ -22,8 +22,6 @@ _LIMIT = 30.0  # [s] of wall time, for a network that is away for a while
 _TRY = 0.5  # [s] of wall time for a connection or an answer
 _PAUSE = 0.05  # [s]
 _DONE = b"done"
-LEFT = f"the guard goes on trying for {_LIMIT:g} s; if a robot moves, switch it off"
-"""What becomes of robots that did not answer, for people."""
 
 
 class Guard:
@@ -45,6 +43,19 @@ class Guard:
         self.leave()
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(1.0)
+
+    def release(self, drivers: Mapping[str, object]) -> str:
+        """End with the program: ``dismiss`` if all robots stand as far as their drivers know, else
+        ``leave``. Returns which do not and what becomes of them, for people; empty if all stand."""
+        moving = [r for r, driver in drivers.items() if not getattr(driver, "standing", True)]
+        if not moving:
+            self.dismiss()
+            return ""
+        self.leave()
+        return (
+            f"no answer to a stop: {', '.join(moving)}; the guard goes on trying for "
+            f"{_LIMIT:g} s; if a robot moves, switch it off"
+        )
 
     def leave(self) -> None:
         """The program ends, and has not heard from every robot that it stands: the process goes on

@@ -16,7 +16,7 @@ from std_srvs.srv import SetBool
 
 from lab_bridge.crowding import Crowding
 from lab_bridge.fleet import Fleet
-from lab_bridge.guard import LEFT, Guard
+from lab_bridge.guard import Guard
 from lab_bridge.lab_clock import LabClock
 from lab_bridge.pose_drivers import PoseHost, make_pose_driver
 from lab_bridge.pose_intake import Clocks, PoseIntake
@@ -242,12 +242,8 @@ class LabBridgeNode(Node):
             self._stopped = True
             self.fleet.close(time.sleep)
         if self._guard is not None:
-            moving = [r for r, d in self._drivers.items() if not getattr(d, "standing", True)]
-            if moving:
-                self.get_logger().error(f"no answer to a stop: {', '.join(moving)}; {LEFT}")
-                self._guard.leave()
-            else:
-                self._guard.dismiss()
+            if left := self._guard.release(self._drivers):
+                self.get_logger().error(left)
             self._guard = None
 
     def destroy_node(self) -> None:

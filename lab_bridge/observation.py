@@ -12,7 +12,7 @@ import numpy as np
 from rclpy.node import Node
 
 from lab_bridge.capture_diagnosis import CaptureFacts, Sample
-from lab_bridge.guard import LEFT, Guard
+from lab_bridge.guard import Guard
 from lab_bridge.marker_mapping import Marker, MarkerMapping
 from lab_bridge.pose_drivers import PoseHost, make_pose_driver
 from lab_bridge.robot_diagnosis import DriveTest
@@ -206,12 +206,6 @@ class Observer:
         self.run(0.25 if self.robots else 0.0)
         for driver in self.robots.values():
             driver.close(time.monotonic())
-        moving = [r for r, d in self.robots.items() if not getattr(d, "standing", True)]
-        if moving:
-            print(f"no answer to a stop: {', '.join(moving)}; {LEFT}", file=sys.stderr)
-        if self._guard is not None:
-            if moving:
-                self._guard.leave()
-            else:
-                self._guard.dismiss()
+        if self._guard is not None and (left := self._guard.release(self.robots)):
+            print(left, file=sys.stderr)
         self._source.close()

@@ -73,13 +73,11 @@ class AgentState:
 
 
 class Agent:
-    """One robot. job: of the robots that it knows of; target: ``(3,)``, or None; mean: ``(2,)``
-    [m],
-    its estimate of the mean position of all robots."""
+    """One robot. job: of the robots that it knows of; mean: ``(2,)`` [m], its estimate of the mean
+    position of all robots."""
 
     def __init__(self, name: str, job: SwarmJob, settings: AgentSettings) -> None:
         self.name, self.job, self.settings = name, job, settings
-        self.target: Array | None = None
         self.mean: Array | None = None
         self._heard: dict[str, AgentState] = {}
         self._before: Array | None = None
@@ -95,7 +93,6 @@ class Agent:
     def pursue(self, target: Array | None) -> None:
         """Take a target ``(3,)``, or none; called at every tick, because the object may have left
         it."""
-        self.target = target
         if target is None:
             self.job.end(JobError.NONE, "no target")
         elif not self.job.busy:
