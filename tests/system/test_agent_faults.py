@@ -75,7 +75,7 @@ def test_words_and_targets_that_are_none_are_refused():
         for agent in agents(run):
             refused = agent._diagnostics.refused
             assert refused["swarm_agent_states"] >= 3 and refused["swarm_target"] >= 2
-            assert np.array_equal(agent.agent.target, GOAL)
+            assert np.array_equal(agent.agent.job.target, GOAL)
         assert all(math.isfinite(speed) for _, speed in told) and told[-1][1] > 0.0
         run.supervisor.end_job(JobError.CANCELED, "enough")
 
