@@ -48,7 +48,7 @@ class LabRig:
     def _pose(self, body: str) -> Array:
         pose = self._observer.pose(body)
         if pose is None:
-            self._fail(f"no poses of '{body}' arrive")
+            self._fail(f"no usable poses of '{body}' arrive")
         assert pose is not None
         return pose
 
@@ -104,7 +104,7 @@ class LabRig:
             if body:
                 seen = now
             if body and now > limit:
-                self._fail(f"no poses of '{body}' arrive")
+                self._fail(f"no usable poses of '{body}' arrive")
 
     def _check(self) -> None:
         """Fail where the robot cannot be commanded, or is about to leave the map."""

@@ -172,7 +172,8 @@ def _unusable(facts: CaptureFacts, lab: LabSettings, bodies: Sequence[str]) -> l
         poses = [s.seen for s in facts.samples if s.marker == marker]
         good = sum(mapping.place(body, seen) is not None for seen in poses)
         if good < _USABLE * len(poses):
-            text = f"{len(poses) - good} of {len(poses)} poses of '{marker}' are no poses"
+            bad = f"{len(poses) - good} of {len(poses)} poses of '{marker}'"
+            text = f"{bad} cannot be used (not finite, or no valid rotation)"
             remedy = f"motion capture loses '{body}': see that its markers are visible"
             found.append((warning if good else error)("UNUSABLE", text, remedy))
     return found
@@ -232,10 +233,11 @@ def _axes(facts: CaptureFacts, lab: LabSettings, bodies: Sequence[str]) -> list[
     tilt, step = _uneven(facts, lab, bodies)
     if tilt < _UPRIGHT and step < _LEVEL:
         return []
-    text = f"bodies are tilted by {math.degrees(tilt):.0f} degrees, heights differ by {step:.2f} m"
     if tilt < _UPRIGHT:  # which the bridge takes
-        remedy = "right if the markers are at these heights; otherwise correct lab.axes"
+        text = f"bodies are upright, but their heights differ by {step:.2f} m"
+        remedy = "ignore this if the markers are at different heights; else correct lab.axes"
         return [warning("WRONG_AXES", text, remedy)]
+    text = f"bodies are tilted by {math.degrees(tilt):.0f} degrees, heights differ by {step:.2f} m"
     for name, axes in (*AXES.items(), ("[y, z, x]", ("y", "z", "x"))):
         t, s = _uneven(facts, replace(lab, axes=axes), bodies)
         if t < _UPRIGHT and s < _LEVEL:
@@ -287,16 +289,15 @@ def _stamps_of(one: str, facts: CaptureFacts, lab: LabSettings) -> list[Finding]
     if lab.stamps == "receipt" and (steps <= 0.0).any():
         return [fact("STAMPS", "the stamps of motion capture are not used (lab.stamps: receipt)")]
     if len(steps) and (steps <= 0.0).mean() > 0.5:
-        text = f"the stamps stand still at {stamps[-1]:.3f} s"
+        text = f"the stamps of '{one}' stand still at {stamps[-1]:.3f} s"
         return [error("STALE_CLOCK", text, f"mend the clock of the driver, or {by_receipt}")]
     if len(steps) and (steps < -0.5).any():
-        return [
-            error("CLOCK_BACK", "the stamps go back", f"look for a second driver, or {by_receipt}")
-        ]
+        text = f"the stamps of '{one}' go back"
+        return [error("CLOCK_BACK", text, f"look for a second driver, or {by_receipt}")]
     ages = arrived - stamps
     mean, spread = float(ages.mean()), float(ages.std())
     if lab.stamps == "capture" and not -0.005 < mean < _FAR_OFF:
-        text = f"stamps differ from this machine's clock by {mean:+.2f} s"
+        text = f"the stamps of '{one}' differ from this machine's clock by {mean:+.2f} s"
         return [
             warning("CLOCK_OFFSET", text, f"synchronise the clocks (chrony, PTP), or {by_receipt}")
         ]
@@ -306,7 +307,8 @@ def _stamps_of(one: str, facts: CaptureFacts, lab: LabSettings) -> list[Finding]
     if lab.stamps == "capture" and kind == "of capture" and lab.latency is not None:
         excess = mean - lab.latency - lab.latency_spread
         if excess > 0.01:
-            text = f"poses are {1e3 * mean:.0f} ms old, declared are {1e3 * lab.latency:.0f} ms"
+            declared = f"lab.latency says {1e3 * lab.latency:.0f} ms"
+            text = f"the poses of '{one}' are {1e3 * mean:.0f} ms old, {declared}"
             found.append(warning("LATENCY_DECLARED", text, f"set lab.latency: {mean:.3f}"))
     return found
 
@@ -324,7 +326,7 @@ def _rate(facts: CaptureFacts, markers: Sequence[str]) -> list[Finding]:
         ]
     gaps = np.diff(arrived)
     rate = 1.0 / float(gaps.mean())
-    told = f"{rate:.0f} poses of a body per second, longest gap {1e3 * gaps.max():.0f} ms"
+    told = f"'{one}': {rate:.0f} poses per second, longest gap {1e3 * gaps.max():.0f} ms"
     if rate < _SLOW:
         return [warning("RATE", told, "let motion capture send at least 50 frames per second")]
     return [fact("RATE", told)]

@@ -53,8 +53,8 @@ class Guard:
             return ""
         self.leave()
         return (
-            f"no answer to a stop: {', '.join(moving)}; the guard goes on trying for "
-            f"{_LIMIT:g} s; if a robot moves, switch it off"
+            f"no answer to the stop command from {', '.join(moving)}; the guard, a process in "
+            f"the background, tries for {_LIMIT:g} s to stop it; if it still moves, switch it off"
         )
 
     def leave(self) -> None:

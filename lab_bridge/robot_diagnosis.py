@@ -56,7 +56,7 @@ def diagnose_robots(facts: RobotFacts) -> list[Finding]:
         elif robot in facts.tests:
             test = facts.tests[robot]
             if test is None:
-                text = f"{robot} was driven, and motion capture lost it meanwhile"
+                text = f"motion capture lost {robot} while it drove"
                 found.append(error("NOT_SEEN", text, "see planar-push doctor mocap"))
             else:
                 found += _drive(robot, test)
@@ -81,7 +81,7 @@ def _drive(robot: str, test: DriveTest) -> list[Finding]:
         ]
     if stays or faces:
         text = "turns, but does not drive ahead" if stays else "drives ahead, but does not turn"
-        remedy = "check both motors, and what the driver makes of v and omega"
+        remedy = "check both motors, and how the robot driver converts v and omega to wheel speeds"
         return [error("NO_MOTION", f"{robot} {text}", remedy)]
     forward = float(test.way[0]) > 0.0
     left = test.turned > 0.0

@@ -37,7 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
     from push_estimation.calibration_runs import Plan, Runs
     from push_estimation.intervals import TooLittle
     from push_model.bumpers import FlatBumper
-    from push_ros.claims import claim_world
+    from push_ros.claims import OCCUPIED, claim_world
     from push_ros.latched import visitor
     from push_ros.names import space
     from push_scenario.scenario import load_scenario
@@ -55,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise SettingsError(f"{out}: there is no folder {out.absolute().parent}")
     claim = claim_world(os.environ.get("ROS_DOMAIN_ID") or "0", space(arguments.namespace))
     if claim is None:
-        raise DomainInUse("a suite is running; stop it before robots are driven")
+        raise DomainInUse(OCCUPIED)
     half = spec.bumper.width / 2.0 if isinstance(spec.bumper, FlatBumper) else 0.0
     plan = Plan(
         spec.push_distance,

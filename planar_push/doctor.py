@@ -65,7 +65,7 @@ def examine(arguments: argparse.Namespace) -> "Iterator[Finding]":
     """
     from lab_bridge.findings import error
     from lab_bridge.observation import Observer
-    from push_ros.claims import claim_world
+    from push_ros.claims import OCCUPIED, claim_world
     from push_ros.latched import visitor
     from push_ros.names import space
 
@@ -73,7 +73,7 @@ def examine(arguments: argparse.Namespace) -> "Iterator[Finding]":
     domain, here = os.environ.get("ROS_DOMAIN_ID") or "0", space(arguments.namespace)
     claim = claim_world(domain, here) if arguments.drive else nullcontext()
     if claim is None:
-        raise SettingsError("a suite is running; stop it before robots are driven")
+        raise SettingsError(OCCUPIED)
     with claim, visitor() as (node, spinner):
         found, scenario, runs = _graph(arguments, node, spinner)
         yield from found

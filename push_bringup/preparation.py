@@ -100,6 +100,6 @@ def check_domain(namespace: str = "", context: Any = None) -> None:
         return
     where = f" in namespace {namespace.strip('/')}" if namespace.strip("/") else ""
     raise DomainInUse(
-        f"a bridge already runs in domain {domain}{where}; stop it, choose another --namespace, "
-        "or set ROS_DOMAIN_ID"
+        f"a bridge already runs in domain {domain}{where}, or a calibration or drive test; stop "
+        "it, choose another --namespace, or set ROS_DOMAIN_ID"
     )

@@ -18,6 +18,7 @@ _MINE = "PLANAR_PUSH_DOMAIN"  # environment: the domain that this process or its
 _RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 DOMAINS = 1, 100
 """First and last domain of runs in lockstep."""
+OCCUPIED = "a suite, a calibration or a drive test runs in this domain; stop it before you drive"
 _claims: dict[int, IO[str]] = {}
 _turns = itertools.count()
 

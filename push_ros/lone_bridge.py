@@ -32,10 +32,10 @@ def refuse_second_bridge(node: Node, names: Names, wait: float) -> IO[str]:
     domain = str(node.context.get_domain_id())
     where = names.world_space.rstrip("/")
     inside = f", namespace {where}" if where else ""
-    runs = SettingsError(f"a bridge already runs in domain {domain}{inside}")
+    begun = f"a bridge already runs in domain {domain}{inside}"
     claim = claim_world(domain, names.world_space)
     if claim is None:
-        raise runs
+        raise SettingsError(f"{begun}, or a calibration or drive test")
     topic = names.world("poses")
     if not _seen(node, topic, time.monotonic() + wait):
         return claim
@@ -48,7 +48,7 @@ def refuse_second_bridge(node: Node, names: Names, wait: float) -> IO[str]:
         while publishers(node, topic, _POSES):
             if any(_taken(sign, kind) for kind, sign in signs) or time.monotonic() > end:
                 claim.close()
-                raise runs
+                raise SettingsError(begun)
             time.sleep(_PAUSE)
     finally:
         for _, sign in signs:

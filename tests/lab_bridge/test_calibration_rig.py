@@ -77,6 +77,6 @@ def test_the_robot_stands_until_poses_are_back(rig):
 def test_poses_that_stay_away_end_the_calibration(rig, monkeypatch):
     monkeypatch.setattr("lab_bridge.calibration_rig._AWAY", 0.5)
     observer, lab = rig((0.1, 60.0))
-    with pytest.raises(RigFailed, match="no poses of 'epuck1' arrive"):
+    with pytest.raises(RigFailed, match="no usable poses of 'epuck1' arrive"):
         lab.run(0.05, 0.0, 5.0)
     assert observer.commands[-1][1] == 0.0

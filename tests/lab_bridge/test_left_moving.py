@@ -186,7 +186,7 @@ def test_poses_that_cannot_be_used_stop_the_robot(robot, orientation, monkeypatc
     rig = LabRig(observer, "one", "box")
     threading.Timer(0.3, setattr, (observer, "orientation", orientation)).start()
     begun = time.monotonic()
-    with pytest.raises(RigFailed, match="no poses of"):
+    with pytest.raises(RigFailed, match="no usable poses of"):
         rig.run(0.05, 0.0, 20.0)
     assert time.monotonic() - begun < 10.0 and robot.speeds == (0, 0)
     observer.close()
