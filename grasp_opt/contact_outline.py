@@ -1,15 +1,28 @@
 """Where a round robot can touch an object: points on its outline, with the normal there."""
 
 import math
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from push_model.arrays import Array
+from push_model.outlines import convex_hull
+from push_model.shape_specs import PolygonShape
 from push_model.shapes import Shape
+from push_model.specs import ObjectSpec
 
 _CORNER = 0.25  # [rad] between edges from which on a vertex is a corner and not part of a curve
+
+
+@lru_cache(maxsize=32)
+def convex(item: ObjectSpec) -> ObjectSpec:
+    """An object with the convex hull of its outline: groups push convex objects, and an outline
+    that is estimated has dents."""
+    if item.geometry.convex:
+        return item
+    hull = tuple((float(x), float(y)) for x, y in convex_hull(item.outline))
+    return replace(item, shape=PolygonShape(vertices=hull, frame="given"))
 
 
 @dataclass(frozen=True)
@@ -98,6 +111,14 @@ class ContactOutline:
         k = np.argmin(away, axis=1)
         rows = np.arange(len(k))
         return self._way[k] + part[rows, k] * self._lengths[k], away[rows, k]
+
+    def same_places(self, other: "ContactOutline", way: Array, moved: Array) -> Array:
+        """Ways ``(n,)`` [m] along this outline to where ways along another one lead, whose origin
+        is at ``moved (2,)`` [m] less; ``way`` itself if both are the same."""
+        old, new = other.shape.outline - moved, self.shape.outline
+        if old.shape == new.shape and np.allclose(old, new, rtol=0.0, atol=1e-9):
+            return way
+        return self.nearest(other.at(way).points - moved)[0]
 
     def way_of_angle(self, theta: Array) -> Array:
         """``(n,)`` [m] along the outline of the points at polar angles theta ``(n,)`` [rad].

@@ -13,7 +13,7 @@ import numpy as np
 from grasp_opt.contact_outline import ContactOutline
 from grasp_opt.group_control import GroupControlSettings
 from grasp_opt.group_push import GroupPush, GroupPushSettings, GroupStep, Phase
-from grasp_opt.job_state import MoveWatch, Request, Step, Tally, Task
+from grasp_opt.job_state import NOBODY, MoveWatch, Request, Step, Tally, Task, without
 from grasp_opt.moves import Mover, MoveSettings, back_off
 from grasp_opt.object_trajectory import ObjectTrajectory
 from grasp_opt.prediction import GroupPrediction
@@ -81,6 +81,7 @@ class GroupJob:
         self.settings = s = settings or GroupJobSettings()
         self._item, self._robot, self._count = item, robot, count
         self._believed: ContactBelief | None = None
+        self._asked_for = self._item, self._believed  # when the request was made
         self._push_settings = push or GroupPushSettings()
         self._control, self._moves = control or GroupControlSettings(), moves or MoveSettings()
         self._outline = ContactOutline(item.geometry)
@@ -167,6 +168,7 @@ class GroupJob:
     def _begin(self, task: Task) -> None:
         self.error = JobError.NONE
         self._task, self._tally, self._step = task, Tally(), Step()
+        self._watch.since = None
         self._enter(JobPhase.DETACHING, "robots back off from the object")
 
     def end(self, code: JobError, message: str) -> None:
@@ -190,9 +192,10 @@ class GroupJob:
         self._item, self._robot, self._believed = item, robot, believed
         if moved.any():
             self._task.about(moved)
-            self._step.about(moved)
-            self.request = self.request and self.request.about(moved)
-        self._outline = ContactOutline(item.geometry)
+            if self.request is not None:
+                self.request, self._asked_for = self.request.about(moved), (item, believed)
+        before, self._outline = self._outline, ContactOutline(item.geometry)
+        self._step.believe(before, self._outline, moved)
         if self._step.watch is not None:
             self._step.watch.believe(item, believed)
         if self._step.push is not None:
@@ -203,9 +206,13 @@ class GroupJob:
         if self.request is None:
             return
         self.request, self._tally.left = None, plan.left
-        watch = SlipWatch(plan.placement.contacts, plan.trajectory, self._item, self._believed)
+        watch = SlipWatch(plan.placement.contacts, plan.trajectory, *self._asked_for)
         mover = Mover(plan.batches, self._robot.differential, self._moves)
         self._step = Step(plan, watch, mover)
+        if self._asked_for != (self._item, self._believed):
+            before = ContactOutline(self._asked_for[0].geometry)
+            watch.believe(self._item, self._believed)
+            self._step.believe(before, self._outline, np.zeros(2))
         count = len(plan.pushers)
         self._enter(JobPhase.POSITIONING, f"{count} robots go to their places")
 
@@ -219,6 +226,8 @@ class GroupJob:
             self.dead = ()
             self._enter(JobPhase.DETACHING, f"{message}; robots that did not move are tried again")
             return
+        if self.dead and code is JobError.TOO_HEAVY:  # for all robots together it may not be
+            code, message = JobError.EXECUTION_FAILED, without(self.dead, self._count, message)
         self.end(code, message)
 
     def rest(self, now: float) -> None:
@@ -251,6 +260,8 @@ class GroupJob:
             twists = self._detach(pose, there)
         else:
             twists = self._go(pose, there)
+        if self.state not in (JobPhase.DETACHING, JobPhase.POSITIONING):
+            return twists
         return twists if self._obeyed(now, robots, twists) else 0.0 * twists
 
     def _enter(self, state: JobPhase, reason: str) -> None:
@@ -293,6 +304,9 @@ class GroupJob:
     def _lost(self, dead: tuple[int, ...], reason: str) -> None:
         """A step went wrong."""
         self.dead = tuple(sorted({*self.dead, *dead}))
+        if dead and len(self.dead) == self._count:
+            self.end(JobError.EXECUTION_FAILED, NOBODY)
+            return
         if dead:
             reason = f"going on without {len(self.dead)} of {self._count} robots: " + (
                 reason or "it does not move although commanded to"
@@ -332,6 +346,7 @@ class GroupJob:
             self.end(JobError.OFF_TARGET, text)
             return
         self._enter(JobPhase.PLANNING, "planning the next step")
+        self._asked_for = self._item, self._believed
         self.request = Request(
             pose.copy(), task.goal, robots.copy(), self.dead, task.along, tally.fewest
         )

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from grasp_opt.contact_outline import convex
 from grasp_opt.group_control import GroupControlSettings
 from grasp_opt.group_job import GroupJob, GroupJobSettings
 from grasp_opt.group_push import GroupPushSettings
@@ -26,6 +27,7 @@ from push_model.object_way import WayFinder
 from push_model.settings import SettingsError
 from push_model.specs import ObjectSpec, RobotSpec
 from push_model.stick_certificate import ContactBelief
+from push_model.traction import lift_share, push_force, standing_traction
 
 MOST = 5
 """Robots of a group at most."""
@@ -54,13 +56,15 @@ class GroupMethod:
         self._asked: Request | None = None
         self._complete = math.inf  # [s] of the last frame with all robots
         self._finder = WayFinder(FreeSpace(arena.grid), arena.item.geometry.outline, 0.0)
+        control = arena.section("control", GroupControlSettings)
+        self._delay = control.pose_delay
         self.job = GroupJob(
             arena.item,
             arena.robot,
             len(self._names),
             arena.section("", GroupJobSettings),
             arena.section("push", GroupPushSettings),
-            arena.section("control", GroupControlSettings),
+            control,
             arena.section("moves", MoveSettings),
         )
 
@@ -83,13 +87,18 @@ class GroupMethod:
 
     def assess(self, task: Task, belief: Belief, seen: Seen | None) -> Certificate | Refusal:
         """See Method: whether the object fits at the goal; a trajectory begins at the object."""
-        item = belief.object(self._arena.object)
+        if not self.job.busy:
+            self._take_up(belief)
+        item = convex(belief.object(self._arena.object))
         if task.times:
             try:
                 trajectory = _trajectory(task, item)
             except ValueError as error:
                 return Refusal(JobError.INVALID_GOAL, str(error))
-            return self._begins_here(trajectory, item, seen)
+            if trajectory.still:
+                return Refusal(JobError.INVALID_GOAL, "the trajectory does not move the object")
+            heavy = self._too_heavy(item, belief)
+            return heavy or self._begins_here(trajectory, item, seen)
         if len(task.targets) > 1:
             text = "a group takes one goal at a time, or a trajectory with times"
             return Refusal(JobError.INVALID_GOAL, text)
@@ -98,7 +107,24 @@ class GroupMethod:
         if self._finder.clearance(item.mass_pose(task.goal), Obstacles())[0] <= 0.0:
             text = "the object would overlap an obstacle at the goal"
             return Refusal(JobError.GOAL_OCCUPIED, text)
-        return Certificate(robots=2)
+        return self._too_heavy(item, belief) or Certificate(robots=self._fewest(item, belief))
+
+    def _too_heavy(self, item: ObjectSpec, belief: Belief) -> Refusal | None:
+        """Whether all robots together cannot move the object, however they stand."""
+        force, count = self._force(item, belief), min(MOST, len(self._names))
+        needed = push_force(item)
+        if needed <= count * force:
+            return None
+        text = f"too heavy: needs {needed:.2f} N, {count} robots have {count * force:.2f} N"
+        return Refusal(JobError.TOO_HEAVY, text)
+
+    def _fewest(self, item: ObjectSpec, belief: Belief) -> int:
+        return max(2, math.ceil(push_force(item) / self._force(item, belief)))
+
+    def _force(self, item: ObjectSpec, belief: Belief) -> float:
+        """[N] with which a robot can push at most."""
+        robot = belief.robot(self._names[0])
+        return standing_traction(robot, lift_share(robot, item))
 
     def _begins_here(
         self, trajectory: ObjectTrajectory, item: ObjectSpec, seen: Seen | None
@@ -249,15 +275,17 @@ class GroupMethod:
 
     def _take_up(self, belief: Belief) -> None:
         """Go on with what is believed of the object and the robots now."""
-        item = belief.object(self._arena.object)
+        item = convex(belief.object(self._arena.object))
         robot = belief.robot(self._names[0])
         if item.shape != self._item.shape or item.com != self._item.com:
             space = FreeSpace(self._arena.grid)
             self._finder = WayFinder(space, item.geometry.outline, 0.0)
         self._item = item
         self.job.believe(item, robot, ContactBelief.of(belief, self._arena.object))
-        if (POSES, "latency") in belief.values:
-            self.job.pose_delay = belief.latency.value
+        told = (POSES, "latency") in belief.values
+        delay = belief.latency.value if told else self._delay
+        if delay != self.job.pose_delay:
+            self.job.pose_delay = delay
 
 
 def _trajectory(task: Task, item: ObjectSpec) -> ObjectTrajectory:

@@ -205,10 +205,10 @@ class GroupPush:
             self.trajectory = self.trajectory.about(moved)
             self._filter.reset()
         self._drive = robot.differential
-        before = self.controller
+        before, outline = self.controller, ContactOutline(item.geometry)
         self.controller = GroupController(
-            ContactOutline(item.geometry),
-            before.ways,
+            outline,
+            outline.same_places(before.outline, before.ways, moved),
             item.contact_friction,
             item.limit_surface(),
             robot.footprint_radius,
@@ -326,7 +326,9 @@ class GroupPush:
         s = self.settings
         assert self._begin is not None
         dead = self._obedience.step(now, robots, twists)
-        if dead and len(dead) < len(robots):
+        if dead and len(dead) == len(robots):
+            return "no robot moves although commanded to: they are stuck, or poses are frozen", ()
+        if dead:
             return f"{_count(dead)} not move although commanded to", dead
         away, turned = self._errors(pose)
         if away > s.position_error or turned > s.orientation_error:

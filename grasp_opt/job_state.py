@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from grasp_opt.contact_outline import ContactOutline
 from grasp_opt.group_push import GroupPush, GroupStep
 from grasp_opt.moves import Mover
 from grasp_opt.object_trajectory import ObjectTrajectory
@@ -13,6 +14,15 @@ from grasp_opt.step_planner import GroupPlan
 from push_estimation.actuation_monitor import ActuationMonitor
 from push_model import se2
 from push_model.arrays import Array
+
+NOBODY = "no robot moves although commanded to: they are switched off, or poses are frozen"
+"""Why a job ends when all robots stand."""
+
+
+def without(dead: tuple[int, ...], count: int, message: str) -> str:
+    """What is told of a failure when so many of ``count`` robots do not move."""
+    those = f"{len(dead)} of {count} robots do not move although commanded to"
+    return f"{those} (switched off, or poses are frozen); without them: {message}"
 
 
 @dataclass
@@ -108,22 +118,27 @@ class Step:
     push: GroupPush | None = None
     last: GroupStep | None = None
 
-    def about(self, point: Array) -> None:
-        """See ``Task.about``."""
-        if self.plan is not None:
-            self.plan = replace(self.plan, trajectory=self.plan.trajectory.about(point))
+    def believe(self, before: ContactOutline, now: ContactOutline, moved: Array) -> None:
+        """The plan for another outline, and another centre of mass by ``moved (2,)`` [m]."""
+        if self.plan is None:
+            return
+        trajectory, placement = self.plan.trajectory, self.plan.placement
+        if moved.any():
+            trajectory = trajectory.about(moved)
+        way = now.same_places(before, placement.way, moved)
+        self.plan = replace(self.plan, trajectory=trajectory, placement=replace(placement, way=way))
 
 
 class MoveWatch:
     """Tells which robots do not move as commanded between two pushes, and when it takes too long.
 
-    since: [s] from when the time is counted.
+    since: [s] from when the time is counted; None: from the next frame on.
     """
 
     def __init__(self, count: int, patience: float, way: float, limit: float) -> None:
         """patience [s], way [m]: of the ActuationMonitor. limit: [s] between two pushes."""
         self._count, self._patience, self._way, self._limit = count, patience, way, limit
-        self.since = 0.0
+        self.since: float | None = None
         self.renew()
 
     def renew(self) -> None:
@@ -134,6 +149,8 @@ class MoveWatch:
         """Indices of robots that do not move, and whether the time is over; see ActuationMonitor
         for the arguments. Either one restarts the time."""
         still = self._monitor.step(now, robots, twists)
+        if self.since is None:
+            self.since = now
         late = now - self.since > self._limit
         if still or late:
             self.since = now

@@ -12,6 +12,7 @@ from push_model.trajectory import ramp
 
 _FINE = 2000  # samples of a curve by which its length is measured
 _STEP = 0.02  # [s]
+_STILL = 1e-9  # [m], [rad]
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,11 @@ class ObjectTrajectory:
     def length(self) -> float:
         """[m] of the way of the centre of mass."""
         return float(np.hypot(*np.diff(self.pose[:, :2], axis=0).T).sum())
+
+    @property
+    def still(self) -> bool:
+        """Whether it does not move the object at all."""
+        return bool(np.ptp(self.pose, axis=0).max() <= _STILL)
 
     @property
     def body_twists(self) -> Array:

@@ -7,14 +7,17 @@ be cancelled at any time.
 
 import sys
 import time
+import traceback
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from nav_msgs.msg import Path
 from rclpy.node import Node
 
+from grasp_opt.contact_outline import convex
 from grasp_opt.group_messages import plan_to_ros, trajectory_from_ros
-from grasp_opt.placement import PlacementSettings
+from grasp_opt.placement_settings import PlacementSettings, PlacementWeights
 from grasp_opt.sequencing import NoStep
 from grasp_opt.slices import Work
 from grasp_opt.step_planner import GroupPlan, Scene, StepPlanner, TooFew
@@ -73,7 +76,7 @@ class OptimizerNode(Node):
         )
         self._weights = declare_settings(
             self,
-            PlacementSettings,
+            PlacementWeights,
             weights,
             "placement",
             "optimizer.placement",
@@ -101,7 +104,7 @@ class OptimizerNode(Node):
             preempt=lambda request: self._preempt(),
         )
         self._first_map = FirstMap(self, names, self._on_no_map)
-        if failure := warm_up(self._item, self._robot, self._weights):
+        if failure := warm_up(self._item, self._robot, self._placement):
             self.get_logger().debug(f"warm-up: {failure}")
 
     @property
@@ -115,6 +118,10 @@ class OptimizerNode(Node):
         self.settings = settings
         self._planner = None
 
+    @property
+    def _placement(self) -> PlacementSettings:
+        return PlacementSettings(**asdict(self._weights))
+
     def _take_map(self, grid: Grid) -> None:
         """A request that waits is begun; a plan under way on another map is begun anew."""
         self._grid, self._planner = grid, None
@@ -126,7 +133,8 @@ class OptimizerNode(Node):
 
     def _take_up(self, belief: Belief) -> None:
         """Plan with what is believed of the object and the robots now."""
-        self._item, self._robot = belief.object(self.object), belief.robot(self.robots[0])
+        self._item = convex(belief.object(self.object))
+        self._robot = belief.robot(self.robots[0])
         self._believed = ContactBelief.of(belief, self.object)
         self._planner = None
 
@@ -172,6 +180,9 @@ class OptimizerNode(Node):
             self._fail(result.INVALID_GOAL, str(error))
         except SettingsError as error:
             self._fail(result.UNKNOWN_OBJECT, str(error))
+        except Exception as error:  # an unexpected one ends the request, not the node
+            self.get_logger().error(f"planning failed: {error!r}\n{traceback.format_exc()}")
+            self._fail(result.NO_STEP, f"an error of the optimizer, see its log: {error!r}")
         else:
             now = time.monotonic()
             if now - self._told > _SIGN_OF_LIFE:
@@ -213,7 +224,7 @@ class OptimizerNode(Node):
         goal = None if task else self._item.mass_pose(stamped_pose(request.goal, "the goal"))
         if self._planner is None:
             self._planner = StepPlanner(
-                *(grid, self._item, self._robot, self.settings, self._weights),
+                *(grid, self._item, self._robot, self.settings, self._placement),
                 self._believed,
             )
             yield

@@ -6,7 +6,7 @@ from push_model.settings import bounded, settings
 
 
 @settings
-class PlacementSettings:
+class PlacementWeights:
     """Weights of (3.16) and room between robots."""
 
     model: Literal["limit_surface", "printed"] = bounded(
@@ -19,7 +19,7 @@ class PlacementSettings:
         low=5,
         high=1000,
         doc="Number N of time steps into which the placement cost (3.16) of the thesis divides a "
-        "task.",
+        "given trajectory; for pushes to a goal, see the parameter 'steps' of the optimizer.",
     )
     position_weight: float = bounded(
         1e4,
@@ -41,7 +41,11 @@ class PlacementSettings:
         "fractions of the floor friction (dimensionless).",
     )
     gap: float = bounded(
-        5e-3, low=0.0, high=1.0, doc="Least gap between the bodies of two robots that push (m)."
+        5e-3,
+        low=0.0,
+        high=1.0,
+        doc="Least gap between the bodies of two robots that push along a given trajectory (m); "
+        "for pushes to a goal, see the parameter 'gap' of the optimizer.",
     )
     corner: float = bounded(
         0.015,
@@ -49,6 +53,12 @@ class PlacementSettings:
         high=1.0,
         doc="Least distance of a contact from a corner of the object's outline (m).",
     )
+
+
+@settings
+class PlacementSettings(PlacementWeights):
+    """What a placement must hold besides; the optimizer chooses it from the task itself."""
+
     least_margin: float = bounded(
         -1.0,
         low=-1.0,

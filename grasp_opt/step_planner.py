@@ -35,6 +35,7 @@ from push_model.traction import lift_share, push_force, standing_traction
 _MOST = 5  # robots that are placed at once
 _ROOMS = (1.0, 0.5, 0.1)  # of the room round the object, one after another
 _POSES = 20_000  # that a slice of the search for the object's way checks, 20 to 60 ms
+_STILL = 1e-9  # [m] of a motion that is none
 _LOOKED_AT = 0.04  # [m] between poses of a piece at which places are looked at
 _PARTS = (1.0, 0.75, 0.5, 0.35, 0.25, 0.15, 0.08)  # of a trajectory that no placement holds whole
 
@@ -209,6 +210,8 @@ class StepPlanner:
         NoStep: also when the object does not keep clear of everything on it.
         """
         self._least(len(scene.alive))
+        if trajectory.still:
+            raise NoStep("the trajectory does not move the object")
         reach = self._reach + self._radius
         count = max(2, math.ceil((trajectory.length + _turned(trajectory) * reach) / _LOOKED_AT))
         times = np.linspace(0.0, trajectory.duration, count)
@@ -259,6 +262,8 @@ class StepPlanner:
     ) -> list[Array]:
         """The first piece, not too long; else only its translation, only its turn."""
         length = size(motion, self._reach)
+        if length <= _STILL:
+            raise NoStep("the object is at the goal already")
         motion = motion * min(1.0, self.settings.longest / length)
         end = se2.between(pose, screw_poses(pose, motion, np.ones(1))[0])
         turns = [np.array([0.0, 0.0, end[2]])] if abs(end[2]) > 0.05 else []

@@ -18,7 +18,10 @@ class StepSettings:
         0.01, low=0.0, high=1.0, doc="Least clearance of robots to obstacles between pushes (m)."
     )
     gap: float = bounded(
-        0.015, low=0.0, high=1.0, doc="Least gap between the bodies of two robots that push (m)."
+        0.015,
+        low=0.0,
+        high=1.0,
+        doc="Least gap between the bodies of two robots that push to a goal (m).",
     )
     standoff: float = bounded(
         0.012,

@@ -14,7 +14,7 @@ from typing import Any
 from rclpy.node import Node
 
 from grasp_opt.group_method import GROUP
-from grasp_opt.placement import PlacementSettings
+from grasp_opt.placement_settings import PlacementWeights
 from grasp_opt.step_settings import StepSettings
 from lab_bridge.settings import LabBridgeSettings
 from push_estimation.outline_estimate import OutlineSettings
@@ -223,7 +223,7 @@ KINDS: dict[str, NodeKind] = {
         "OptimizerNode",
         _team,
         _TEAM,
-        {"": StepSettings, "placement": PlacementSettings},
+        {"": StepSettings, "placement": PlacementWeights},
     ),
     "swarm": NodeKind(
         "swarm_push.node",

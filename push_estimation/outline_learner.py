@@ -28,9 +28,9 @@ class OutlineLearner:
         self._stopped = StoppedRobots(radius, stopped)
         self._period, self._next = period, -math.inf
 
-    def command(self, name: str, vx: float, vy: float, world: bool) -> None:
+    def command(self, name: str, stamp: float, vx: float, vy: float, world: bool) -> None:
         """See StoppedRobots."""
-        self._stopped.command(name, vx, vy, world)
+        self._stopped.command(name, stamp, vx, vy, world)
 
     def interrupted(self) -> None:
         """The stream of poses was interrupted, or its clock was reset; what was learned stays."""

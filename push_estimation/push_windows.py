@@ -114,6 +114,8 @@ class PushWindows:
         t = times - middle
         seen = np.array(self._seen)
         robot = np.array([f[1] for f in self._frames])
+        if (robot == robot[0]).all():  # frozen poses say nothing of the noise
+            return None
         robot[:, 2] = np.unwrap(robot[:, 2])
         spread = float(t @ t)
         lines, scatter = _fitted(t, seen, 1)

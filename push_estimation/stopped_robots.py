@@ -22,6 +22,7 @@ from push_model.settings import bounded, settings
 _BESIDE = 0.1  # cosine of the angle to the way that was commanded up to which a body is beside it
 _OUTWARD = 0.3  # cosine of the angle to the outward normal of a way on which the object may stop it
 _LONGEST = 0.2  # [s] between frames of one window
+_FORCE = 0.2  # [s] of pose time for which a command is in force, as at the bridges
 
 
 @settings
@@ -116,17 +117,19 @@ class StoppedRobots:
     def __init__(self, radius: float, settings: StoppedSettings | None = None) -> None:
         """radius: [m] of the robots."""
         self.settings, self._radius = settings or StoppedSettings(), radius
-        self._commands: dict[str, tuple[float, float, bool]] = {}
+        self._commands: dict[str, tuple[float, float, float, bool]] = {}
         self._watches: dict[str, _Watch] = {}
         self._last: tuple[float, Array, dict[str, Array]] | None = None
 
-    def command(self, name: str, vx: float, vy: float, world: bool) -> None:
-        """A velocity [m/s], in the robot's own frame or that of the world."""
-        self._commands[name] = (vx, vy, world)
+    def command(self, name: str, stamp: float, vx: float, vy: float, world: bool) -> None:
+        """A velocity [m/s], in the robot's own frame or that of the world, that answers the poses
+        of a time [s]. It is in force for ``_FORCE`` seconds; then the robot stands."""
+        self._commands[name] = (stamp, vx, vy, world)
 
     def reset(self) -> None:
         """The stream was interrupted."""
         self._watches.clear()
+        self._commands.clear()
         self._last = None
 
     def frame(
@@ -154,7 +157,7 @@ class StoppedRobots:
         bodies = np.vstack([*places.values(), se2.transform(now, others)])
         found = []
         for name, place in places.items():
-            if name not in robots_then or name not in self._commands:
+            if name not in robots_then or not self._told(name, stamp):
                 self._watches.pop(name, None)
                 continue
             before = robots_then[name]
@@ -174,8 +177,12 @@ class StoppedRobots:
                     found.append(stop)
         return found
 
+    def _told(self, name: str, now: float) -> bool:
+        """Whether a command to a robot is in force."""
+        return name in self._commands and now - self._commands[name][0] <= _FORCE
+
     def _velocity(self, name: str, pose: Array) -> Array:
-        vx, vy, world = self._commands[name]
+        _, vx, vy, world = self._commands[name]
         if world:
             return np.array([vx, vy])
         c, s = np.cos(pose[2]), np.sin(pose[2])

@@ -154,7 +154,8 @@ class EstimatorNode(Node):
             state["windows"] = push.windows
             state["windows that no value explains"] = push.strange
             state["intervals widened"] = push.widened + estimates.latency.widened
-        recent = [c for c in estimates.contradictions if self._poses.stamp - c.time < _SHOWN]
+        now = self._poses.stamp
+        recent = [c for c in estimates.contradictions if 0.0 <= now - c.time < _SHOWN]
         if recent:
             state["warning"] = recent[-1].sentence
         return state

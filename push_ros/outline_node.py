@@ -122,7 +122,7 @@ class OutlineNode(Node):
 
     def _on_command(self, heard: Heard) -> None:
         self._robots.add(heard.robot)  # robots that join the team later too
-        self.learner.command(heard.robot, heard.vx, heard.vy, heard.fixed)
+        self.learner.command(heard.robot, heard.stamp, heard.vx, heard.vy, heard.fixed)
 
     def _take_map(self, grid: OccupancyGrid) -> None:
         self._walls = DistanceField(grid)

@@ -182,3 +182,17 @@ def test_a_new_request_replaces_the_one_under_way(client):
     assert client.spinner.until(lambda: len(chain) > 50, 30.0) and all(chain)
     second.cancel_goal_async()
     assert client.result(second).error_code == R.CANCELED
+
+
+def test_a_goal_at_the_start_and_an_error_of_the_planner_end_the_request_only(client, monkeypatch):
+    answer = client.result(client.send([0.0, 0.0, 0.0]))
+    assert answer.error_code == R.NO_STEP and "at the goal already" in answer.error_msg
+
+    def broken(*_):
+        raise ZeroDivisionError("float division by zero")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(StepPlanner, "planning", broken)
+        answer = client.result(client.send([0.3, 0.0, 0.0]))
+    assert answer.error_code == R.NO_STEP and "ZeroDivisionError" in answer.error_msg
+    assert client.result(client.send([0.3, 0.0, 0.0])).error_code == 0

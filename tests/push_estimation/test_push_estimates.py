@@ -38,6 +38,18 @@ def test_the_noise_is_estimated_from_the_stream():
         assert windows.scatter[1] == pytest.approx(np.sqrt(2.0) * noise[1], rel=0.35)
 
 
+def test_frozen_poses_say_nothing_of_the_noise():
+    windows, luck = PushWindows(BOX.outline, BUMPER), np.random.default_rng(3)
+    for k in range(600):
+        pair = np.array([[0.05 * k / RATE, 0.0, 0.0], [0.05 * k / RATE + 0.095, 0.0, 0.0]])
+        pair += luck.standard_normal((2, 3)) * [2e-4, 2e-4, 0.0017453]
+        windows.add(k / RATE, *pair)
+    before = windows.scatter
+    for k in range(600, 600 + 60 * round(RATE)):
+        windows.add(k / RATE, *pair)
+    assert windows.scatter == pytest.approx(before, rel=0.1)
+
+
 def test_without_contact_nothing_counts():
     windows = PushWindows(BOX.outline, BUMPER)
     for k in range(500):

@@ -40,7 +40,7 @@ def watched(moves, seed, seconds=1.2, others=NONE):
         for name, (place, command, velocity) in moves.items():
             at = se2.transform(item, np.array([place]))[0] + t * turn @ np.array(velocity)
             body = se2.rotation_matrix(heading).T @ turn @ np.array(command)
-            stopped.command(name, *body, False)
+            stopped.command(name, t, *body, False)
             robots[name] = np.array([*(at + NOISE * random.standard_normal(2)), heading])
         world = se2.transform(item, others) if len(others) else NONE
         found += [s.place for s in stopped.frame(t, item, robots, world, LINE)]
@@ -94,7 +94,7 @@ def test_a_robot_that_follows_the_object_at_a_distance_is_not_stopped(seed):
         robots["b"] = robots["a"] + [0.02, 0.2, 0.0]
         robots = {n: p + 5e-4 * random.standard_normal(3) for n, p in robots.items()}
         for name in robots:
-            stopped.command(name, 0.05, 0.0, False)
+            stopped.command(name, t, 0.05, 0.0, False)
         found += stopped.frame(t, item, robots, NONE, LINE)
     assert not found
 
@@ -108,7 +108,7 @@ def test_a_robot_that_pushes_the_object_is_stopped_by_it(seed):
         t = k * STEP
         item = np.array([0.05 * t, 0.0, 0.0]) + 5e-4 * random.standard_normal(3)
         robot = np.array([0.05 * t - R, 0.0, 0.0]) + 5e-4 * random.standard_normal(3)
-        stopped.command("a", 0.08, 0.0, False)
+        stopped.command("a", t, 0.08, 0.0, False)
         found += [s.place for s in stopped.frame(t, item, {"a": robot}, NONE, LINE)]
     assert len(found) == 2 and all(np.hypot(*(p - FACE)) < 1.5e-3 for p in found)
 
@@ -128,7 +128,7 @@ def test_who_pushes_an_object_without_being_at_its_outline(seed, touching):
             robots["b"] = robots["a"] + [0.03, 0.2, 0.0]
         robots = {n: p + 5e-4 * random.standard_normal(3) for n, p in robots.items()}
         for name in robots:
-            stopped.command(name, 0.05, 0.0, False)
+            stopped.command(name, t, 0.05, 0.0, False)
         found += stopped.frame(t, item, robots, NONE, line)
     assert len(found) == (0 if touching else 2)
     assert all(np.hypot(*(s.place - FACE)) < 1.5e-3 and not s.on_its_way for s in found)
@@ -137,12 +137,13 @@ def test_who_pushes_an_object_without_being_at_its_outline(seed, touching):
 @pytest.mark.parametrize("seed", range(10))
 def test_at_a_wall_and_far_from_the_object_the_cause_is_not_known(seed):
     stopped, robot = StoppedRobots(R), np.array([-R, 0.0, 0.0])
-    stopped.command("a", 0.05, 0.0, False)
     for k in range(60):
         t = k * STEP
+        stopped.command("a", t, 0.05, 0.0, False)
         assert not stopped.frame(t, np.zeros(3), {"a": robot}, NONE, LINE, unsure={"a"})
     for k in range(60):
         t = 2.0 + k * STEP
+        stopped.command("a", t, 0.05, 0.0, False)
         assert not stopped.frame(t, np.zeros(3), {"a": robot - [0.12, 0.0, 0.0]}, NONE, LINE)
 
 
@@ -160,12 +161,29 @@ def test_behind_another_body_the_cause_is_not_known(seed, angle):
 
 def test_after_an_interruption_a_window_begins_anew():
     stopped = StoppedRobots(R)
-    stopped.command("a", 0.03, 0.0, False)
     robot, item = np.array([-R, 0.0, 0.0]), np.zeros(3)
-    for k in range(20):
-        assert not stopped.frame(STEP * k, item, {"a": robot}, NONE, LINE)
+
+    def frames(begin, count):
+        found = []
+        for k in range(count):
+            stopped.command("a", begin + STEP * k, 0.03, 0.0, False)
+            found.append(stopped.frame(begin + STEP * k, item, {"a": robot}, NONE, LINE))
+        return found
+
+    assert not any(frames(0.0, 20))
     stopped.reset()
-    found = [stopped.frame(5.0 + STEP * k, item, {"a": robot}, NONE, LINE) for k in range(20)]
-    assert not any(found)
-    found = [stopped.frame(9.0 + STEP * k, item, {"a": robot}, NONE, LINE) for k in range(60)]
-    assert any(found)
+    assert not any(frames(5.0, 20))
+    assert any(frames(9.0, 60))
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_robot_that_nobody_commands_any_more_stands_by_itself(seed):
+    """Whoever commanded it has died: the bridge stops it, and its poses go on."""
+    random = np.random.default_rng(seed)
+    stopped, off = StoppedRobots(R), random.uniform(0.01, 0.08)
+    for k in range(500):
+        t = k * STEP
+        if t < 0.3:
+            stopped.command("a", t, 0.05, 0.0, False)
+        robot = np.array([-R - off, 0.0, 0.0]) + 5e-4 * random.standard_normal(3)
+        assert not stopped.frame(t, np.zeros(3), {"a": robot}, NONE, LINE)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from push_bringup.systems import nodes_of
+from push_estimation.push_estimates import Contradiction
 from push_msgs.msg import Belief
 from push_ros.claims import own_domain
 from push_ros.qos import BELIEF
@@ -46,7 +47,9 @@ def pushed():
         stamp, robot = 1e3 + run.bridge.time, np.zeros(3)
         for k in range(200):
             node.estimates.frame(stamp + 0.01 * k, robot, np.array([np.nan, 0.0, 0.0]))
-        return said, drawn, latency, learned, node.estimates.intervals()
+        after = node.estimates.intervals()
+        node.estimates.contradictions.append(Contradiction(stamp, ("com_x",), False, "before"))
+        return said, drawn, latency, learned, after, node._state()
 
 
 def test_what_it_publishes_holds_the_truth(pushed):
@@ -70,8 +73,12 @@ def test_what_it_publishes_holds_the_truth(pushed):
 
 
 def test_poses_that_are_not_finite_change_nothing(pushed):
-    *_, before, after = pushed
+    *_, before, after, _ = pushed
     assert before == after
+
+
+def test_after_the_clock_was_set_back_no_warning_of_before_is_shown(pushed):
+    assert "warning" not in pushed[-1]
 
 
 @pytest.mark.long
