@@ -223,7 +223,7 @@ class TrackerSettings:
         doc="Gap between object and bumper above which contact is in doubt (m)",
     )
     contact_aside: float = bounded(
-        0.045,
+        0.02,
         low=1e-3,
         high=1.0,
         doc="Displacement of the object along the bumper above which contact is in doubt (m)",
