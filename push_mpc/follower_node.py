@@ -88,7 +88,7 @@ class Follower(Protocol):
         ...
 
     def rest(self, dt: float, frame: Frame) -> Command:
-        """Answer a frame in which no task is worked on; one that there is is kept."""
+        """Answer a frame that is refused, or in which no task is worked on; a task is kept."""
         ...
 
     def halt(self) -> None:
@@ -221,7 +221,7 @@ class FollowerNode(Node):
     def _on_frame(self, frame: Frame) -> None:
         self.stamp = frame.stamp
         if frame.verdict is Stamp.REFUSED:
-            self.send(None)  # whatever time it is: stand still
+            self.send(self.follower.rest(_TICK, frame))
             return
         if frame.verdict is Stamp.RESET:
             self._heartbeat.reset()

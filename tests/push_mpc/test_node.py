@@ -64,6 +64,13 @@ class Course:
         twist = self.answer.twist
         self.poses["me"] = unicycle_step(self.poses["me"], twist.linear.x, twist.angular.z, 0.01)
 
+    def refused(self):
+        """A further frame with the stamp of the last one; the speed [m/s] that answers it."""
+        self.answer = None
+        self.publisher.publish(poses_to_ros(self.poses, self.tick / 100))
+        assert self.spinner.until(lambda: self.answer is not None, 15.0)
+        return self.answer.twist.linear.x
+
     def gap(self, name):
         return float(np.hypot(*(self.poses["me"] - self.poses[name])[:2]))
 
@@ -165,3 +172,18 @@ def test_without_a_push_there_is_none_to_go_on_with(course, fields):
             course.step()
         assert course.controller.tracker.active is moving
         assert (course.answer.twist.linear.x > 0.05) is moving
+
+
+@pytest.mark.parametrize("count", [1, 10])
+def test_after_refused_frames_it_accelerates_from_a_stand(course, count):
+    course.step()
+    course.follow()
+    for _ in range(100):
+        course.step()
+    assert course.answer.twist.linear.x > 0.09
+    assert {course.refused() for _ in range(count)} == {0.0}
+    course.step()
+    assert 0.0 <= course.answer.twist.linear.x <= 0.5 * 0.01 + 1e-6  # [m/s^2], [s]
+    for _ in range(100):
+        course.step()
+    assert course.answer.twist.linear.x > 0.09

@@ -17,7 +17,7 @@ from push_bringup.systems import LOCKSTEP, nodes_of
 from push_model.trajectory import line
 from push_msgs.action import FollowTrajectory
 from push_msgs.msg import WheelTorques
-from push_ros.conversions import trajectory_to_ros
+from push_ros.conversions import poses_to_ros, trajectory_to_ros
 from push_ros.process import Spinner
 from push_ros.qos import COMMAND, STREAM
 from push_scenario.events import DropPoses
@@ -195,6 +195,21 @@ def test_a_cancel_at_full_speed_skids_no_wheel(run):
         slips.append(np.abs(run.bridge.world.wheel_state("pioneer").speed * 0.095 - v).max())
     assert max(slips) < 0.1, slips  # locked wheels: 0.5 m/s
     assert run.stands() and run.x - begin < 0.3
+
+
+def test_refused_frames_at_full_speed_lock_no_wheel(run, monkeypatch):
+    """It brakes by torques; the trajectory goes on with the next frame."""
+    answer = run.send(6.0).get_result_async()
+    run.spin(3.0)
+    assert run.bridge.world.wheel_state("pioneer").speed.min() > 4.0
+    follower, sent = run.node.follower, []
+    send = follower.send
+    monkeypatch.setattr(follower, "send", lambda *told: (sent.append(told[0]), send(*told)))
+    for _ in range(5):
+        run.node.poses.take(poses_to_ros(run.bridge.world.poses(), run.node.poses.stamp))
+    assert all(torques is not None and max(torques) < 0.0 for torques in sent), sent
+    assert run.spinner.until(answer.done, 120.0)
+    assert answer.result().result.error_code == CODES.NONE
 
 
 def compare(tmp_path, case, seeds, **changes):
