@@ -112,7 +112,7 @@ class Arranger:
                     continue
                 begun = True
                 if state.job > self._jobs + 1:
-                    return JobError.PREEMPTED.name, "other goals have replaced these"
+                    return JobError.PREEMPTED.name, "goals that were sent later have replaced these"
                 step = f" ({state.step_index + 1} of {state.step_count})"
                 busy = state.state != JobState.IDLE
                 tell(str(state.reason) + (step if busy and state.step_count else ""))

@@ -1,23 +1,20 @@
 """The supervisor, which makes the moves of a rearrangement: a goal out, its end back."""
 
-import math
 from collections.abc import Callable
 from typing import Any
 
 from rclpy.node import Node
 
-from push_model import se2
 from push_model.arrays import Array
 from push_model.jobs import JobError
 from push_msgs.action import MoveObject
 from push_msgs.msg import JobState
+from push_planner.goal_messages import same_goal
 from push_ros.actions import GoalClient
 from push_ros.conversions import pose_stamped_to_ros
 from push_ros.names import Names
 from push_ros.qos import LATCHED
 from push_ros.validation import InvalidMessage, stamped_pose
-
-_SAME = 1e-6  # [m], [rad] within which a job of the supervisor is the one that was asked for
 
 
 class Mover:
@@ -30,7 +27,7 @@ class Mover:
         self._ended = ended
         self._client = GoalClient(node, MoveObject, names.team("move_object"))
         self._asked: tuple[str, Array] | None = None
-        self._begun = False  # whether the supervisor is seen to work on it
+        self._begun = False  # whether the supervisor was seen to work on it, or was gone
         node.create_subscription(JobState, names.team("job_state"), self._on_job, LATCHED)
 
     @property
@@ -49,6 +46,10 @@ class Mover:
         self._asked = None
         self._client.forget()
 
+    def missed(self) -> None:
+        """The supervisor is gone: if it comes back without a job, it has forgotten this one."""
+        self._begun = True
+
     def _end(self, code: JobError, why: str) -> None:
         if self._asked is not None:
             self.forget()
@@ -61,14 +62,21 @@ class Mover:
             self._end(JobError(result.error_code), str(result.error_msg))
 
     def _on_job(self, state: JobState) -> None:
-        """A supervisor that was restarted continues its job, but its answer is lost."""
-        if self._asked is None or state.object != self._asked[0]:
+        """A supervisor that was restarted continues its job, but its answer is lost; or it has
+        forgotten all jobs."""
+        if self._asked is None:
+            return
+        if not state.goal.header.frame_id and self._begun:
+            why = "the supervisor was restarted and does not continue the move"
+            self._end(JobError.JOB_FORGOTTEN, why)
+            return
+        if state.object != self._asked[0]:
             return
         try:
-            off = stamped_pose(state.goal, "the goal") - self._asked[1]
+            goal = stamped_pose(state.goal, "the goal")
         except InvalidMessage:
             return
-        if math.hypot(off[0], off[1]) > _SAME or abs(se2.wrap(float(off[2]))) > _SAME:
+        if not same_goal(goal, self._asked[1]):
             return
         idle = state.state == JobState.IDLE and not state.plan_ready
         if idle and self._begun:

@@ -19,13 +19,15 @@ from push_model.distance_field import DistanceField
 from push_model.jobs import GoalRefused, JobError, JobPhase
 from push_model.occupancy import OccupancyGrid as Grid
 from push_model.settings import SettingsError, from_mapping
+from push_model.traction import too_heavy
 from push_msgs.msg import JobState, Poses
+from push_planner.goal_messages import goals_of, same_goals
 from push_planner.peers import Mover
 from push_planner.push_plan import PlanError, PlanningFailed
 from push_planner.rearrangement import Move, Rearrangement, RearrangementSettings
 from push_planner.settings import PlannerSettings
 from push_ros.belief_feed import BeliefFeed
-from push_ros.conversions import pose_stamped_to_ros, poses_from_ros
+from push_ros.conversions import pose_stamped_to_ros
 from push_ros.diagnostics import Diagnostics
 from push_ros.map_feed import MapFeed
 from push_ros.names import names_of
@@ -35,7 +37,6 @@ from push_ros.process import run_node
 from push_ros.qos import COMMAND, LATCHED
 from push_ros.scheduling import Urgency
 from push_ros.services import CALLS, Services
-from push_ros.validation import InvalidMessage, check_frame
 from push_scenario.scenario import Scenario, load_scenario
 
 GOALS = "goal_poses"
@@ -49,6 +50,7 @@ CANCEL = "cancel_rearrangement"
 
 _PERIOD = 0.1  # [s] of the frames that are looked at
 _PATIENCE = 10.0  # [s] until a job ends whose map, poses or supervisor do not come
+_GONE = "the supervisor does not answer; restart it, or launch with --respawn"
 _ENDS = (JobError.CANCELED, JobError.PREEMPTED, JobError.CLOCK_RESET, JobError.TOO_HEAVY)
 _CODES = {
     PlanError.INVALID_GOAL: JobError.INVALID_GOAL,
@@ -98,7 +100,7 @@ class RearrangerNode(Node):
         self._work: Generator[str, None, list[Move]] | None = None
         self._moves: list[Move] = []
         self._index = self._failures = 0
-        self._since = math.nan  # [s] on the clock of silence: since when it waits
+        self._since = math.nan  # [s] on the clock of silence: since when something is missing
         self.planning = 0.0  # [s] CPU time of the search for moves, of the last job
         self._state = JobState(system="rearrange", robots=[self._robot])
         self._diagnostics = Diagnostics(self, names, self._diagnose)
@@ -157,6 +159,10 @@ class RearrangerNode(Node):
             state.refusal_code, state.refusal = int(refusal.code), str(refusal)
             self._publisher.publish(state)
             return
+        if self.busy and same_goals(goals, self._goals):  # of another client, which takes over
+            self._state.job += 1
+            self._publisher.publish(self._state)
+            return
         if self.busy:
             self._end(JobError.PREEMPTED, "new goals replace these")
         self._goals, self._failures, self.planning = goals, 0, 0.0
@@ -171,22 +177,7 @@ class RearrangerNode(Node):
         ------
         GoalRefused: goals that cannot be, as far as is known without a plan.
         """
-        try:
-            check_frame(message.header.frame_id, "the goals")
-        except InvalidMessage as error:
-            raise GoalRefused(JobError.UNKNOWN_FRAME, str(error)) from None
-        unknown = [n for n in message.names if n not in self._items]
-        if unknown:
-            known = ", ".join(self._items)
-            text = f"unknown objects: {', '.join(unknown)}; expected of: {known}"
-            raise GoalRefused(JobError.UNKNOWN_OBJECT, text)
-        try:
-            goals, refused = poses_from_ros(message)
-        except InvalidMessage as error:
-            raise GoalRefused(JobError.INVALID_GOAL, str(error)) from None
-        if refused or not goals:
-            text = "; ".join(refused) or "no goals; name at least one object"
-            raise GoalRefused(JobError.INVALID_GOAL, text)
+        goals = goals_of(message, self._items)
         if self._grid is not None:
             try:
                 self._rearrangement().check(goals)
@@ -195,6 +186,14 @@ class RearrangerNode(Node):
                 raise GoalRefused(code, str(failure)) from None
             except SettingsError as error:
                 raise GoalRefused(JobError.PLANNING_FAILED, str(error)) from None
+        belief = self._beliefs.current
+        for name, goal in goals.items():
+            pose = self._pose(name)
+            if pose is not None and self.settings.reached(pose, goal):
+                continue
+            problem = too_heavy(belief.robot(self._robot), belief.object(name))
+            if problem is not None:
+                raise GoalRefused(JobError.TOO_HEAVY, f"'{name}': {problem}")
         return goals
 
     def _rearrangement(self) -> Rearrangement:
@@ -223,6 +222,8 @@ class RearrangerNode(Node):
 
     def _tend(self) -> None:
         """Begin to plan, or lose patience."""
+        if self._phase is _Phase.MOVING:
+            self._tend_move()
         if self._phase is not _Phase.WAITING:
             return
         poses = {n: p for n in self._items if (p := self._pose(n)) is not None}
@@ -231,15 +232,27 @@ class RearrangerNode(Node):
         if self.ready and not missing and robot is not None:
             self._plan(poses, robot)
             return
-        now = self._poses.clock.now
-        self._since = now if math.isnan(self._since) else self._since
-        if now - self._since > _PATIENCE:
+        if self._impatient():
             if not self.ready:
-                what = "no map came" if self._grid is None else "the supervisor does not answer"
-                self._end(JobError.NODE_LOST, what)
+                self._end(JobError.NODE_LOST, "no map came" if self._grid is None else _GONE)
             else:
                 names = ", ".join(missing or [self._robot])
                 self._end(JobError.POSES_STALE, f"no poses of {names} arrive")
+
+    def _tend_move(self) -> None:
+        """Lose patience with a supervisor that is gone."""
+        if self._mover.ready:
+            self._since = math.nan
+            return
+        self._mover.missed()
+        if self._impatient():
+            self._end(JobError.NODE_LOST, f"'{self._state.object}': {_GONE}")
+
+    def _impatient(self) -> bool:
+        """Whether something has been missing for too long; call this while it is."""
+        now = self._poses.clock.now
+        self._since = now if math.isnan(self._since) else self._since
+        return now - self._since > _PATIENCE
 
     def _plan(self, poses: dict[str, Array], robot: Array) -> None:
         try:
@@ -278,7 +291,7 @@ class RearrangerNode(Node):
         if self._index == len(self._moves):
             self._conclude()
             return
-        self._phase = _Phase.MOVING
+        self._phase, self._since = _Phase.MOVING, math.nan
         move = self._moves[self._index]
         goal = pose_stamped_to_ros(move.goal, self._poses.stamp)
         self._state.object, self._state.goal = move.object, goal

@@ -39,3 +39,21 @@ def test_a_job_that_is_seen_to_end_ends_the_move_once(ros):
     mover._on_job(told(JobState.IDLE))
     assert len(ends) == 1
     node.destroy_node()
+
+
+def test_a_supervisor_without_any_job_has_forgotten_the_move(ros):
+    """One that was seen at work, or that was gone, comes back and has no goal."""
+    node, ends = rclpy.create_node("mover"), []
+    mover = Mover(node, Names("/", "/"), lambda code, why: ends.append(code))
+    restarted = JobState(state=JobState.IDLE, object="crate")
+    mover.move("box", GOAL, 1.0)
+    mover._on_job(restarted)  # it has not heard of the move yet
+    assert ends == []
+    mover._on_job(told(JobState.PUSHING))
+    mover._on_job(restarted)
+    assert ends == [JobError.JOB_FORGOTTEN]
+    mover.move("box", GOAL, 2.0)
+    mover.missed()
+    mover._on_job(restarted)
+    assert ends == [JobError.JOB_FORGOTTEN] * 2
+    node.destroy_node()
