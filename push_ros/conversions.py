@@ -259,6 +259,9 @@ def segment_to_ros(segment: PushSegment) -> SegmentMessage:
 
 def segment_from_ros(message: SegmentMessage) -> PushSegment:
     """A push from its message; raises InvalidMessage."""
+    finite((message.k_start, message.k_end, message.length), "a length of a push")
+    if math.isnan(message.clearance):
+        raise InvalidMessage("the clearance of a push is not a number")
     return PushSegment(
         int(message.side),
         planar_pose(message.object_start, "object_start"),

@@ -139,6 +139,9 @@ class Peers:
             except InvalidMessage as problem:
                 failed(JobError.PLANNING_FAILED, f"the plan is not valid: {problem}")
                 return
+            if not segments:
+                failed(JobError.PLANNING_FAILED, "the planner answered with a plan of no pushes")
+                return
             self._answered(number, events.PlanFound(segments, improving))
 
         def working(feedback: Any) -> None:

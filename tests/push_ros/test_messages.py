@@ -55,10 +55,14 @@ def test_segment_round_trip(turns):
     assert np.array_equal(back.trajectory.pose, there.trajectory.pose)
 
 
-@pytest.mark.parametrize("change", ["limits", "pose", "trajectory"])
+@pytest.mark.parametrize(
+    "change", ["limits", "pose", "trajectory", "k_start", "k_end", "length", "clearance"]
+)
 def test_broken_segments_are_refused(change):
     message = c.segment_to_ros(segment())
-    if change == "limits":
+    if hasattr(message, change) and change != "trajectory":
+        setattr(message, change, math.nan)
+    elif change == "limits":
         message.curvature_min = 0.5
     elif change == "pose":
         message.object_end.position.x = math.nan
