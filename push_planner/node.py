@@ -14,6 +14,7 @@ from push_model.arrays import Array
 from push_model.occupancy import OccupancyGrid as Grid
 from push_model.push_segment import PushSegment
 from push_model.settings import SettingsError
+from push_model.specs import ObjectSpec, RobotSpec
 from push_model.stick_certificate import ContactBelief
 from push_msgs.action import PlanPush
 from push_msgs.msg import PushPlan as PlanMessage
@@ -92,7 +93,7 @@ class PlannerNode(Node):
         self._path_publisher = self.create_publisher(Path, names.team("push_path"), LATCHED)
         MapFeed(self, names, self._diagnostics, self._take_map)
         self._beliefs = BeliefFeed(
-            self, names, self._scenario, self._diagnostics, lambda belief: self._plan_anew()
+            self, names, self._scenario, self._diagnostics, lambda belief: self._believe()
         )
         self._server = GoalServer(
             self,
@@ -126,13 +127,25 @@ class PlannerNode(Node):
         self._plan_anew(self._first_map.awaited)
 
     def _plan_anew(self, waiting: bool = False) -> None:
-        """The map or the belief is another one: a plan under way is dropped and begun anew.
+        """The map is another one: a plan under way is dropped and begun anew.
 
         waiting: whether a request waits that can begin now.
         """
         self._planners.clear()
         if waiting or self._work is not None:
             self._begin(self._request)
+
+    def _believe(self) -> None:
+        """Another belief: a plan under way that it concerns is dropped and begun anew."""
+        for pair, planner in list(self._planners.items()):
+            scene = planner.scene
+            if self._specs(*pair) != (scene.robot, scene.item, scene.believed):
+                del self._planners[pair]
+        if self._work is None:
+            return
+        request = self._request
+        if self._pair(request.robot, request.object) not in self._planners:
+            self._begin(request)
 
     def _on_no_map(self, reason: str) -> None:
         self._fail(PlanPush.Result.NO_MAP, reason)
@@ -146,20 +159,25 @@ class PlannerNode(Node):
     def _planner(self, robot: str, item: str) -> PushPlanner:
         """Raises SettingsError for names that are not known, PlanningFailed for a robot that is not
         made for pushing."""
-        robot, item = self._scenario.robot(robot)[0], self._scenario.object(item)[0]
-        belief = self._beliefs.current
-        robot_spec, item_spec = belief.robot(robot), belief.object(item)
-        key = (robot, item)
-        if key not in self._planners:
+        pair = robot, item = self._pair(robot, item)
+        if pair not in self._planners:
+            specs = self._specs(robot, item)
             try:
-                believed = ContactBelief.of(belief, item)
-                specs = robot_spec, item_spec, believed
                 planner = PushPlanner(self.settings, self._distances(), *specs)
             except SettingsError as error:
                 why = f"robot '{robot}' cannot push '{item}': {error}"
                 raise PlanningFailed(PlanError.NO_PUSH_SEQUENCE, why) from None
-            self._planners[key] = planner
-        return self._planners[key]
+            self._planners[pair] = planner
+        return self._planners[pair]
+
+    def _specs(self, robot: str, item: str) -> tuple[RobotSpec, ObjectSpec, ContactBelief | None]:
+        """What is believed now of a robot, an object and their contact."""
+        belief = self._beliefs.current
+        return belief.robot(robot), belief.object(item), ContactBelief.of(belief, item)
+
+    def _pair(self, robot: str, item: str) -> tuple[str, str]:
+        """Names in the place of empty ones; raises SettingsError for names that are not known."""
+        return self._scenario.robot(robot)[0], self._scenario.object(item)[0]
 
     def _warm_up(self) -> None:
         """Load what is compiled before the first request."""

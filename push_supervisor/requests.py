@@ -12,7 +12,9 @@ such as feedback:
   in a simulation that is faster than real time.
 - The planner counts as silent if this time is too long by the clock of the supervisor.
 - In lockstep, planning may take any time. The planner then counts as lost only when its server has
-  left the graph.
+  left the graph. If it comes back and shows no sign of life, it has forgotten the request.
+- Without poses, pose time stands still. The time without a sign of life of the controller is then
+  limited by the clock of the supervisor alone.
 """
 
 from collections.abc import Callable, Mapping
@@ -96,6 +98,11 @@ class Verdict:
 
 
 _WAIT, _ASK = Verdict(Step.WAIT), Verdict(Step.ASK)
+_BLIND = Verdict(
+    Step.GIVE_UP,
+    JobError.POSES_STALE,
+    "no poses of robot and object arrive; check the motion capture",
+)
 
 
 class Requests:
@@ -113,6 +120,7 @@ class Requests:
         self.number = 0
         self.asks = 0
         self._asked = False
+        self._gone = False  # whether the node has left the graph since its last sign of life
         self._not_before = 0.0  # [s] pose time
         self._missing: float | None = None  # [s] by the clock since when it could not be asked
         self._sign_clock = self._sign_stamp = 0.0
@@ -153,15 +161,12 @@ class Requests:
                 JobError.NODE_LOST,
                 f"{peer.value} is not in the ROS graph; start it, or launch with --respawn",
             )
-        return Verdict(
-            Step.GIVE_UP,
-            JobError.POSES_STALE,
-            "no poses of robot and object arrive; check the motion capture",
-        )
+        return _BLIND
 
     def sign(self, number: int, now: Moment) -> None:
         """Take note of a sign of life of the node that received the attempt with this number."""
         if number == self.number and self._asked:
+            self._gone = False
             self._sign_clock, self._sign_stamp = now.clock, now.stamp
 
     def answer(self, number: int) -> bool:
@@ -174,16 +179,20 @@ class Requests:
     def _ask(self, now: Moment) -> Verdict:
         self.number += 1
         self.asks += 1
-        self._asked = True
+        self._asked, self._gone = True, False
         self._sign_clock, self._sign_stamp = now.clock, now.stamp
         return _ASK
 
     def _listen(self, request: Request, now: Moment) -> Verdict:
         """Whether the silence has lasted too long."""
-        if now.lockstep and request.peer is not Peer.CONTROLLER and now.ready(request.peer):
+        self._gone = self._gone or not now.ready(request.peer)
+        if now.lockstep and request.peer is not Peer.CONTROLLER and not self._gone:
             return _WAIT
         silence = now.clock - self._sign_clock
         if request.peer is Peer.CONTROLLER:
+            if not now.poses and silence > self.settings.node_timeout:
+                self.drop()
+                return _BLIND
             silence = min(silence, now.stamp - self._sign_stamp)
             if silence <= self.settings.controller_timeout:
                 return _WAIT

@@ -8,16 +8,18 @@ import rclpy
 from nav_msgs.msg import OccupancyGrid, Path
 from rclpy.action import ActionClient
 
+from push_model.belief import Interval
 from push_model.occupancy import rasterise
 from push_model.specs import BoxSpec, EnvironmentSpec
 from push_msgs.action import PlanPush
-from push_msgs.msg import Circle, PushPlan
+from push_msgs.msg import Belief, Circle, PushPlan
 from push_msgs.srv import PlanRobotPath
 from push_planner.node import PlannerNode
 from push_ros import map_feed
 from push_ros.conversions import grid_to_ros, pose_stamped_to_ros, pose_to_ros
 from push_ros.process import Spinner
-from push_ros.qos import LATCHED
+from push_ros.qos import BELIEF, LATCHED
+from push_ros.report_conversions import belief_to_ros
 from push_scenario.scenario import load_scenario
 from tests.push_planner.preemptive_case import needs_preemptive_push
 
@@ -130,6 +132,27 @@ def test_a_new_map_drops_a_plan_under_way_and_begins_it_anew(client):
     assert client.result(handle).error_code == R.GOAL_OCCUPIED
 
 
+@pytest.mark.parametrize(("item", "anew"), [("other", False), ("box", True)])
+def test_a_belief_begins_a_plan_anew_only_if_it_is_about_its_object(ros, item, anew):
+    scenario = load_scenario("short")
+    spec, _ = scenario.objects["box"]
+    scenario = replace(scenario, objects={**scenario.objects, "other": (spec, np.ones(3))})
+    client = Client(scenario)
+    beliefs = client.node.create_publisher(Belief, "/belief", BELIEF)
+    assert client.spinner.until(lambda: beliefs.get_subscription_count() > 0, 10.0)
+    try:
+        client.send(object="box")
+        assert client.spinner.until(lambda: client.planner._work is not None, 10.0)
+        work, before = client.planner._work, client.planner._beliefs.current
+        values = {(item, "contact_friction"): Interval(0.31, 0.3, 0.4)}
+        beliefs.publish(belief_to_ros("estimator", values))
+        assert client.spinner.until(lambda: client.planner._beliefs.current != before, 10.0)
+        assert client.planner._work is not None
+        assert (client.planner._work is not work) is anew
+    finally:
+        client.spinner.close()
+
+
 @pytest.fixture
 def unmapped(ros):
     client = make(mapped=False, improvement_rounds=0)
@@ -164,7 +187,7 @@ def test_without_a_map_a_request_ends_and_says_why(unmapped, monkeypatch):
     """New beliefs meanwhile do not make it wait longer."""
     monkeypatch.setattr(map_feed, "PATIENCE", 0.5)
     answer = unmapped.send().get_result_async()
-    believed = unmapped.planner._plan_anew  # what each new belief does
+    believed = unmapped.planner._believe  # what each new belief does
     assert unmapped.spinner.until(lambda: bool(believed() or answer.done()), 10.0)
     result = answer.result().result
     assert result.error_code == R.NO_MAP and result.error_msg == "no map has been received on /map"

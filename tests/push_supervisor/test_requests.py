@@ -137,6 +137,39 @@ def test_in_lockstep_a_planner_is_lost_only_when_it_leaves_the_graph(request_):
     assert (verdict.step, verdict.code) == (Step.GIVE_UP, JobError.NODE_LOST)
 
 
+@pytest.mark.parametrize("request_", [PLAN, Request(FindPath("s"))])
+@pytest.mark.parametrize("away", [0.5, 3.0])  # [s] shorter and longer than answer_timeout
+def test_in_lockstep_a_planner_that_was_restarted_is_asked_again(request_, away):
+    requests = begun(request_, locked(0.0))
+    requests.tend(locked(0.0))
+    for clock in np.arange(0.1, away, 0.1):
+        assert requests.tend(locked(clock, frozenset())).step is Step.WAIT
+    steps = [requests.tend(locked(clock)).step for clock in np.arange(away, away + 2.2, 0.1)]
+    assert steps.count(Step.ASK) == 1 and requests.asks == 2
+    assert requests.tend(locked(1e9)).step is Step.WAIT
+
+
+def test_in_lockstep_a_planner_that_was_only_frozen_is_not_asked_again():
+    """Its server leaves the graph while it is stopped; then it goes on, and says so."""
+    requests = begun(PLAN, locked(0.0))
+    requests.tend(locked(0.0))
+    assert requests.tend(locked(1.0, frozenset())).step is Step.WAIT
+    requests.sign(requests.number, locked(1.5))
+    for clock in (2.1, 1e3):
+        assert requests.tend(locked(clock)).step is Step.WAIT and requests.asks == 1
+
+
+def test_without_poses_a_silent_controller_is_not_waited_for_for_ever():
+    """Bridge and controller are gone: pose time stands still."""
+    requests = begun(PUSH)
+    requests.tend(at(0.0, 0.0))
+    for wall in (1.1, 4.9):
+        assert requests.tend(at(wall, 0.0, poses=False, ready=frozenset())).step is Step.WAIT
+    verdict = requests.tend(at(5.1, 0.0, poses=False, ready=frozenset()))
+    assert (verdict.step, verdict.code) == (Step.GIVE_UP, JobError.POSES_STALE)
+    assert requests.request is None
+
+
 def test_in_lockstep_a_controller_answers_in_pose_time():
     requests = begun(PUSH, locked(0.0))
     requests.tend(locked(0.0))
