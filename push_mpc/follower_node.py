@@ -179,6 +179,10 @@ class FollowerNode(Node):
             raise InvalidMessage(
                 "the heartbeat timeout must not be negative; 0 turns the check off"
             )
+        tolerances = (request.position_tolerance, request.orientation_tolerance)
+        finite(tolerances, "a tolerance")
+        if min(tolerances) < 0.0:
+            raise InvalidMessage("a tolerance must not be negative; 0 takes the node's parameter")
         return self.follower.parse(request)
 
     def _begin(self, request: Any) -> None:

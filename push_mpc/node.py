@@ -39,7 +39,7 @@ from push_ros.process import run_node
 from push_ros.qos import COMMAND, STATUS
 from push_ros.report_conversions import report_to_ros
 from push_ros.scheduling import Urgency
-from push_ros.validation import InvalidMessage, finite, planar_pose
+from push_ros.validation import InvalidMessage, planar_pose
 from push_scenario.scenario import Scenario
 
 _SAME = 1e-6  # [m], [rad] between poses in which two pushes begin
@@ -128,8 +128,6 @@ class VelocityFollower:
     def parse(self, request: Any) -> Task:
         """See Follower."""
         trajectory = trajectory_from_ros(request.trajectory)
-        tolerances = (request.position_tolerance, request.orientation_tolerance)
-        finite(tolerances, "a tolerance")
         push = None
         if request.object and request.object not in self._scenario.objects:
             raise InvalidMessage(f"unknown object '{request.object}'")
@@ -146,15 +144,13 @@ class VelocityFollower:
             raise InvalidMessage("only a push can go on where another one is")
         elif request.mode != FollowTrajectory.Goal.MOVE:
             raise InvalidMessage(f"unknown mode {request.mode}")
-        if min(tolerances) < 0.0:
-            raise InvalidMessage("a tolerance must not be negative")
         s = self._tracker_settings
         return Task(
             trajectory,
             push,
             circles_from_ros(request.obstacles),
-            tolerances[0] or s.position_tolerance,
-            tolerances[1] or s.orientation_tolerance,
+            request.position_tolerance or s.position_tolerance,
+            request.orientation_tolerance or s.orientation_tolerance,
         )
 
     def _check_going_on(self, item: str, trajectory: Trajectory) -> None:

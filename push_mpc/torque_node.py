@@ -99,11 +99,21 @@ class TorqueFollower:
             )
         if request.going_on:
             raise InvalidMessage("only a push can go on where another one is")
+        if request.obstacles:
+            raise InvalidMessage(
+                "the torque controller keeps off no obstacles; leave 'obstacles' empty, and send a "
+                "trajectory that leads past them"
+            )
+        if request.object:
+            raise InvalidMessage(
+                "leave 'object' empty: to the torque controller, an object that is pushed is a "
+                "disturbance"
+            )
         return trajectory_from_ros(request.trajectory)
 
     def begin(self, request: Any, task: Trajectory) -> None:
         """See Follower."""
-        self.tracker.start(task)
+        self.tracker.start(task, request.position_tolerance, request.orientation_tolerance)
 
     def missing(self, frame: Frame) -> str:
         """See Follower: the robot must be seen in every frame."""

@@ -110,8 +110,21 @@ class TorqueTracker:
         """That wheels may ask for now."""
         return self._full * self.trust.part
 
-    def start(self, trajectory: Trajectory) -> None:
-        """Begin; the reference starts with the next tick."""
+    def start(
+        self,
+        trajectory: Trajectory,
+        position_tolerance: float = 0.0,
+        orientation_tolerance: float = 0.0,
+    ) -> None:
+        """Begin; the reference starts with the next tick.
+
+        position_tolerance, orientation_tolerance: [m], [rad] of the end; 0: that of the settings.
+        """
+        s = self.settings
+        self._tolerances = (
+            position_tolerance or s.position_tolerance,
+            orientation_tolerance or s.orientation_tolerance,
+        )
         self._trajectory, self._time, self._failed = trajectory, 0.0, 0
         self.trust.start()
         self.controller.trusted = self._full
@@ -158,7 +171,7 @@ class TorqueTracker:
         if off > s.off_course:
             return self._ended(TrackError.OFF_COURSE, _away(off), error, progress)
         if self._time > trajectory.duration + s.settle_time:
-            if off > s.position_tolerance or turned > s.orientation_tolerance:
+            if off > self._tolerances[0] or turned > self._tolerances[1]:
                 why = (
                     f"the trajectory ended with an error of {1e3 * off:.0f} mm and {turned:.2f} rad"
                 )

@@ -16,7 +16,7 @@ from push_bringup.node_settings import changed, resolved
 from push_bringup.systems import LOCKSTEP, nodes_of
 from push_model.trajectory import line
 from push_msgs.action import FollowTrajectory
-from push_msgs.msg import WheelTorques
+from push_msgs.msg import Circle, WheelTorques
 from push_ros.conversions import poses_to_ros, trajectory_to_ros
 from push_ros.process import Spinner
 from push_ros.qos import COMMAND, STREAM
@@ -112,6 +112,30 @@ def test_a_push_is_refused_and_a_broken_trajectory_too(run):
     sent = run.client.send_goal_async(empty)
     assert run.spinner.until(sent.done, 20.0) and not sent.result().accepted
     assert run.stands()
+
+
+@pytest.mark.parametrize(
+    "field",
+    [
+        {"obstacles": [Circle(x=0.5, y=0.0, radius=0.4)]},
+        {"object": "box"},
+        {"position_tolerance": float("nan")},
+        {"position_tolerance": -0.1},
+        {"orientation_tolerance": float("inf")},
+        {"orientation_tolerance": -1.0},
+    ],
+    ids=lambda field: next(iter(field)),
+)
+def test_a_field_that_it_cannot_obey_is_refused(run, field):
+    assert not run.send(**field).accepted
+    assert run.send(1.0).accepted
+
+
+def test_tolerances_of_a_goal_are_obeyed(run):
+    result = run.result(run.send(0.6, position_tolerance=1e-6))
+    assert result.error_code == CODES.TIMEOUT, result.error_msg
+    result = run.result(run.send(0.6))
+    assert result.error_code == CODES.NONE, result.error_msg
 
 
 @pytest.mark.parametrize("how", ["cancel", "heartbeat"])
