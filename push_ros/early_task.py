@@ -1,4 +1,7 @@
-"""A task that is taken before there is a map; it begins when the map is there."""
+"""A task that is taken before there is a map, and begins when the map is there.
+
+What the present method cannot tell is kept here, too: how a task ended that had no method, or one
+that was made for an earlier map."""
 
 from push_job.method import Task
 from push_job.report import Status
@@ -8,7 +11,7 @@ _WAITING = Status(int(JobPhase.PLANNING), JobPhase.PLANNING.name, "waiting for a
 
 
 class EarlyTask:
-    """At most one task, and how the last one ended that never began. task: the one that waits."""
+    """At most one task, and how the last one ended. task: the one that waits."""
 
     def __init__(self) -> None:
         self.task: Task | None = None
@@ -32,6 +35,10 @@ class EarlyTask:
         """The task that waits ends without having begun."""
         self.task = None
         self._ended = Status(int(JobPhase.IDLE), JobPhase.IDLE.name, reason, int(code))
+
+    def keep(self, status: Status) -> None:
+        """A method that is replaced tells this last; it stands until the next task begins."""
+        self._ended = status
 
     def forget(self) -> Task | None:
         """The task that has waited begins now, or another one does."""

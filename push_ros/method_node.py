@@ -261,6 +261,8 @@ class MethodNode(Node):
         if self._grid is not None:
             self._door.drop(JobError.PREEMPTED, "the map has changed")
             self.end_job(JobError.PREEMPTED, "the map has changed")
+        if self.method is not None:
+            self._early.keep(self.status)
         self._grid = grid
         arena = Arena(grid, self.robot_specs, self.object, self.item, self.settings, self.partners)
         try:

@@ -1,11 +1,17 @@
-"""A goal that comes to the node of a method before the map: it waits, and is told how it ends."""
+"""A goal that comes to the node of a method before the map: it waits, and is told how it ends.
+
+A job that a new map ends is told of in the same way."""
+
+from dataclasses import replace
 
 import pytest
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import OccupancyGrid
 from std_srvs.srv import Trigger
 
+from push_job.method import Unsuited
 from push_model.jobs import JobError
+from push_model.occupancy import OccupancyGrid as Grid
 from push_msgs.msg import JobState
 from push_ros import method_node
 from push_ros.conversions import grid_to_ros, pose_stamped_to_ros
@@ -49,6 +55,10 @@ def send(client, goal=None):
     message = pose_stamped_to_ros(client.scenario.goal if goal is None else goal, 1.0)
     client.goals.publish(message)
     return message
+
+
+def unsuited(arena):
+    raise Unsuited("the room is too narrow")
 
 
 def test_it_begins_when_the_map_is_there(pair):
@@ -99,3 +109,26 @@ def test_without_a_map_it_ends_and_says_why(pair, monkeypatch):
     assert until(lambda: client.last.state == JobState.IDLE)
     assert client.last.error_code == JobError.PLANNING_FAILED
     assert client.last.reason == "no map has been received on /map"
+
+
+@pytest.mark.parametrize("suited", [True, False])
+def test_a_new_map_during_a_job_leaves_its_end_to_read(pair, suited):
+    """The topic is latched: who looks late must not take the new method's idleness for success."""
+    node, client, until = pair
+    client.maps.publish(grid_to_ros(client.scenario.grid, 0.0))
+    assert until(lambda: node.method is not None)
+    send(client)
+    assert until(lambda: node.busy and client.last.job == 1)
+    grid, old = client.scenario.grid, node.method
+    if not suited:
+        node.spec = replace(node.spec, make=unsuited)
+    occupied = grid.occupied.copy()
+    occupied[0, 0] = not occupied[0, 0]
+    client.maps.publish(grid_to_ros(Grid(occupied, grid.resolution, grid.origin), 1.0))
+    assert until(lambda: node.method is not old and client.last.state == JobState.IDLE)
+    until(lambda: False, 0.3)
+    assert (client.last.job, client.last.error_code) == (1, JobError.PREEMPTED)
+    assert client.last.reason == "the map has changed" and not node.busy
+    if suited:
+        send(client)
+        assert until(lambda: client.last.job == 2 and node.busy), "the next one is taken"
