@@ -163,6 +163,8 @@ class Monitor:
             return True
         if not self._began or self._sent is None:
             return False
+        if not state.goal.header.frame_id:
+            return False  # a task that was no goal
         mine, other = self._sent.pose, state.goal.pose
         gaps = (
             mine.position.x - other.position.x,

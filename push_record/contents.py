@@ -322,6 +322,8 @@ def _take_state(job: Job, message: Any, shift: float) -> None:
             job.goal = goal
         except InvalidMessage:  # a recorded message need not be valid
             pass
+    elif message.job:
+        job.goal = None
     job.states.append(
         State(
             stamp,

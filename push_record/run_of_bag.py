@@ -30,6 +30,11 @@ Call = tuple[str, str, str]
 _IDLE = 1  # state of JobState
 _POSE = "geometry_msgs/msg/PoseStamped"
 _SAME = 1e-6  # [m], [rad] of two goals that are the same
+_NO_GOALS = (
+    "a job of the bag came as a trajectory or as several targets in an action "
+    "(push_along, swarm_move), whose goals are not in the bag; only goals on goal_pose "
+    "and of move_object can be repeated"
+)
 
 
 @dataclass(frozen=True)
@@ -210,6 +215,8 @@ class _Seen:
         refused = int(message.refusals) > self._refusals.get(team, 0)
         self._refusals[team] = int(message.refusals)
         if job > before:
+            if not message.goal.header.frame_id:
+                raise CannotRerun(_NO_GOALS)
             goal = self._goal_of(message.goal)
             stamp = message.header.stamp
             if goal is not None:
@@ -218,11 +225,7 @@ class _Seen:
             self._jobs[team] = job
         idle = int(message.state) == _IDLE and not message.plan_ready
         if self._idle.get(team, False) and not idle and job == before:
-            raise CannotRerun(
-                "a job of the bag came as a trajectory or as several targets in an action "
-                "(push_along, swarm_move), whose goals are not in the bag; only goals on goal_pose "
-                "and of move_object can be repeated"
-            )
+            raise CannotRerun(_NO_GOALS)  # older bags gave such a task no number of its own
         self._idle[team] = idle and job == before
         self._ended[team] = refused or (idle and job > 0)
 

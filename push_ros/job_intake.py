@@ -6,8 +6,8 @@ nothing. Any other one replaces the job under way.
 """
 
 import math
-from collections.abc import Callable, Collection, Sequence
-from typing import Any, Protocol
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
@@ -25,7 +25,8 @@ from push_msgs.msg import JobState
 from push_ros.actions import GoalServer
 from push_ros.diagnostics import Diagnostics
 from push_ros.job_keeper import PATIENCE, Bodies, JobKeeper
-from push_ros.job_memory import JobMemory, KeptJob
+from push_ros.job_memory import JobMemory
+from push_ros.job_owner import JobOwner, ObjectChoice
 from push_ros.names import Names
 from push_ros.qos import COMMAND, LATCHED
 from push_ros.services import CALLS, Services
@@ -33,60 +34,8 @@ from push_ros.validation import FRAME, InvalidMessage, stamped_pose
 
 _SAME = 1e-6  # [m], [rad] within which a goal is the one that is pursued
 
-
 Answer = Callable[[GoalRefused | None], None]
 Consider = Callable[[Array, Answer], None]
-
-
-class JobOwner(Protocol):
-    """Who does the job."""
-
-    @property
-    def busy(self) -> bool:
-        """Whether a job is under way."""
-        ...
-
-    @property
-    def plan_ready(self) -> bool:
-        """Whether a plan waits for the execute command."""
-        ...
-
-    def check_goal(self, goal: Array) -> None:
-        """Raise GoalRefused unless the goal ``(3,)`` could be worked on."""
-        ...
-
-    def take_goal(self, goal: Array, plan_only: bool) -> None:
-        """Begin a job; none is under way."""
-        ...
-
-    def end_job(self, code: JobError, message: str) -> None:
-        """End the job under way, or drop the plan that waits; answer with ``JobIntake.finish``."""
-        ...
-
-    def execute(self) -> None:
-        """Carry out the plan that waits."""
-        ...
-
-    def resume(self, job: KeptJob) -> None:
-        """Begin anew with a job that was under way when this node was started again."""
-        ...
-
-
-class ObjectChoice(Protocol):
-    """An owner whose jobs may be about other objects than its own."""
-
-    @property
-    def names_of_objects(self) -> Collection[str]:
-        """All objects, also its own."""
-        ...
-
-    def check_other(self, item: str, goal: Array) -> None:
-        """Raise GoalRefused unless a goal ``(3,)`` of another object could be worked on."""
-        ...
-
-    def use(self, item: str) -> None:
-        """Work on this object from now on; no job is under way."""
-        ...
 
 
 class JobIntake:
@@ -109,9 +58,11 @@ class JobIntake:
         memory: JobMemory | None = None,
         choice: ObjectChoice | None = None,
         no_plan_only: str = "",
+        refuse: Callable[[JobError, str], None] = lambda code, reason: None,
     ) -> None:
         """consider: in the place of the owner's ``check_goal``, where that takes time: answers, now
         or later, with why a goal ``(3,)`` is refused, with None where it can be worked on.
+        refuse: answers a goal that is still considered, if there is one, with a refusal.
         memory: of jobs; that of the process if it is not given. choice: of other objects.
         no_plan_only: why the owner does not plan without executing; empty where it does."""
         self._no_plan_only = no_plan_only
@@ -120,10 +71,11 @@ class JobIntake:
         self._dropped: GoalRefused | None = None  # why the last job ended, not taken up again
         self._run, self._since = "", math.nan
         self._stamp = 0.0  # [s] of the last frame
-        self._consider = consider or self._check
+        self._consider, self._refuse = consider or self._check, refuse
         self._node, self._owner, self._diagnostics = node, owner, diagnostics
         self._item, self._choice = item, choice
-        self._goal: Array | None = None  # of the job under way, or of the last one
+        self._goal: Array | None = None  # of the job under way, or of the last one, if it has one
+        self._plan_only = False  # whether that job ends with its plan
         self._state = JobState(system=system, robots=list(robots), object=item)
         if (kept := self._keeper.pending) is not None:
             self._use(self._keeper.item)
@@ -138,7 +90,9 @@ class JobIntake:
             names.team("move_object"),
             check=lambda request: None,
             consider=self._consider_request,
-            preempt=lambda request: self._make_way(request.object or item, request.goal),
+            preempt=lambda request: self._make_way(
+                request.object or item, request.goal, bool(request.plan_only)
+            ),
             start=lambda request: self._take(
                 request.object or item, request.goal, bool(request.plan_only)
             ),
@@ -158,7 +112,7 @@ class JobIntake:
 
     @property
     def goal(self) -> Array | None:
-        """Goal ``(3,)`` of the job under way, or of the last one."""
+        """Goal ``(3,)`` of the job under way, or of the last one; None for a task without one."""
         return self._goal
 
     @property
@@ -198,8 +152,14 @@ class JobIntake:
 
     # A job that outlives its node
 
+    def begin(self, task: Task) -> None:
+        """A task begins that did not come as a goal: a job of its own, with an empty goal."""
+        self._goal, self._state.goal = None, PoseStamped()
+        self._state.job += 1
+        self.keep(task)
+
     def keep(self, task: Task) -> None:
-        """A task begins that did not come as a goal."""
+        """Keep what the owner has made of the job that begins."""
         self._dropped = None
         goal = bytes(serialize_message(self._state.goal))
         self._keeper.begin(int(self._state.job), goal, task.targets, task.times)
@@ -231,7 +191,8 @@ class JobIntake:
         if job is not None:
             self._node.get_logger().warning("the node was restarted and continues its job")
             targets = tuple(np.array(t) for t in job.targets)
-            self._goal = targets[-1]
+            sent, self._plan_only = self._state.goal, job.plan_only
+            self._goal = stamped_pose(sent, "the goal") if sent.header.frame_id else None
             goal = bytes.fromhex(job.goal)
             self._dropped = None
             self._keeper.begin(job.job, goal, targets, job.times, job.plan_only)
@@ -307,9 +268,11 @@ class JobIntake:
             refusal = error
         answer(refusal)
 
-    def _pursued(self, item: str, goal: Array) -> bool:
-        """Whether the job under way has this goal."""
+    def _pursued(self, item: str, goal: Array, plan_only: bool) -> bool:
+        """Whether the job under way has this goal, and does with it what is asked."""
         if self._goal is None or not self._owner.busy or item != self._state.object:
+            return False
+        if plan_only != self._plan_only:
             return False
         gap = goal - self._goal
         return bool(np.hypot(gap[0], gap[1]) < _SAME and abs(se2.wrap(float(gap[2]))) < _SAME)
@@ -319,7 +282,7 @@ class JobIntake:
             if refusal is not None:
                 self._say_no(message, refusal)
                 return
-            self._make_way(self._item, message)
+            self._make_way(self._item, message, False)
             self._take(self._item, message, False)
 
         self._judge(message, self._goal_topic, judged)
@@ -344,9 +307,9 @@ class JobIntake:
             return
         self._judge(request.goal, "move_object", judged, request.object)
 
-    def _make_way(self, item: str, message: PoseStamped) -> None:
+    def _make_way(self, item: str, message: PoseStamped, plan_only: bool) -> None:
         """End what is under way, unless it is the same."""
-        same = self._pursued(item, stamped_pose(message, "the goal"))
+        same = self._pursued(item, stamped_pose(message, "the goal"), plan_only)
         why = "a new goal replaces this one"
         if same:  # whoever waited for it waits no longer; the job goes on
             code = int(JobError.PREEMPTED)
@@ -361,11 +324,11 @@ class JobIntake:
     def _take(self, item: str, message: PoseStamped, plan_only: bool) -> None:
         goal = stamped_pose(message, "the goal")
         self._state.goal = message
-        if self._pursued(item, goal):
+        if self._pursued(item, goal, plan_only):
             self._state_publisher.publish(self._state)
             return
         self._use(item)
-        self._goal, self._dropped = goal, None
+        self._goal, self._plan_only, self._dropped = goal, plan_only, None
         self._state.job += 1
         kept = bytes(serialize_message(message))
         self._keeper.begin(int(self._state.job), kept, (goal,), plan_only=plan_only)
@@ -384,6 +347,7 @@ class JobIntake:
     def _on_execute(self, request: Any, response: Any) -> Any:
         response.success = self._owner.plan_ready
         response.message = "executing" if response.success else "there is no plan to execute"
+        self._plan_only = self._plan_only and not response.success
         self._owner.execute()
         return response
 
@@ -393,6 +357,7 @@ class JobIntake:
         if self._keeper.pending is not None:
             some = True
             self._drop(GoalRefused(JobError.CANCELED, "canceled"))
+        self._refuse(JobError.CANCELED, "canceled")
         self._owner.end_job(JobError.CANCELED, "canceled")
         response.success = some or self._state.refusals > refusals
         response.message = "canceled" if response.success else "there is nothing to cancel"

@@ -123,6 +123,7 @@ class MethodNode(Node):
         self._intake = JobIntake(
             *(self, names, self._diagnostics, self, chosen.name, list(team), self.object),
             consider=lambda goal, answer: self.consider_task(self._task(goal), answer),
+            refuse=self._door.drop,
             memory=memory,
             no_plan_only=f"the method '{chosen.name}' plans as it goes; leave plan_only unset",
         )
@@ -181,7 +182,7 @@ class MethodNode(Node):
 
     def resume(self, job: KeptJob) -> None:
         """See JobOwner."""
-        self.take_task(Task(tuple(np.array(t) for t in job.targets)))
+        self._take(Task(tuple(np.array(t) for t in job.targets)))
 
     def stop(self) -> None:
         """The process ends in good order."""
@@ -193,7 +194,7 @@ class MethodNode(Node):
 
     def take_goal(self, goal: Array, plan_only: bool) -> None:
         """See JobOwner; goals with plan_only are refused before."""
-        self.take_task(self._task(goal))
+        self._take(self._task(goal))
 
     def _task(self, goal: Array) -> Task:
         own = self.settings.get("")
@@ -202,8 +203,6 @@ class MethodNode(Node):
 
     def end_job(self, code: JobError, message: str) -> None:
         """See JobOwner."""
-        if code is JobError.CANCELED:
-            self._door.drop(code, message)
         if self._early.task is not None:
             self._early.end(code, message)
         elif self.method is not None:
@@ -238,6 +237,11 @@ class MethodNode(Node):
 
     def take_task(self, task: Task) -> None:
         """See TaskHost."""
+        self._intake.begin(task)
+        self._take(task)
+
+    def _take(self, task: Task) -> None:
+        """Begin the task of the job that the intake has begun."""
         self._waiting, self._missing = self._poses.clock.now, 0.0
         self._intake.keep(task)
         if self.method is not None:
@@ -252,7 +256,7 @@ class MethodNode(Node):
         if refusal is not None:
             self._early.end(refusal.code, str(refusal))
         elif (task := self._early.forget()) is not None:
-            self.take_task(task)
+            self._take(task)
         self._look_after_task()
 
     # The world

@@ -138,11 +138,12 @@ def _fault_rows(faults: Iterable[Fault]) -> Iterable[tuple[Any, ...]]:
 
 
 def with_job(contents: BagContents) -> list[Job]:
-    """The jobs of a bag; one with the scenario's goal, if none was recorded."""
+    """The jobs of a bag. If no goal was recorded, and no task without one, the goal is that of the
+    scenario."""
     jobs = list(contents.jobs.values())
     if not jobs:
         item = next(iter(contents.scenario.objects), "")
         jobs = [Job("/", robots=tuple(contents.scenario.robots), object=item)]
-    if len(jobs) == 1 and jobs[0].goal is None:
+    if len(jobs) == 1 and jobs[0].goal is None and not any(s.job for s in jobs[0].states):
         jobs[0].goal = contents.scenario.goal
     return jobs

@@ -109,6 +109,17 @@ def test_another_goal_that_is_taken_replaces_ours(world):
     assert result.code is JobError.PREEMPTED and "another goal" in result.reason
 
 
+def test_a_task_without_a_goal_replaces_ours_at_the_origin_too(world):
+    """An empty goal looks like one at the origin."""
+    monitor, _, (owner,), _ = world
+    monitor.send_goal((0.0, 0.0, 0.0))
+    assert owner.spinner.until(lambda: len(owner.heard) == 2, 15.0)
+    owner.take(owner.heard[-1])
+    assert monitor.wait(15.0, lambda: monitor.state.job == 5) and monitor.poll() is None
+    owner.take(PoseStamped())
+    assert polled(monitor).code is JobError.PREEMPTED
+
+
 def test_a_state_is_told_once_whatever_its_progress(world):
     monitor, events, (owner,), _ = world
     goal = owner.heard[-1]

@@ -126,30 +126,49 @@ def test_a_bag_that_lacks_something_says_what(tmp_path, scenario):
         run_of_bag(write(tmp_path / "c", ticks=0, metadata=about))
 
 
-def test_goals_are_found_with_the_stamps_of_their_jobs(tmp_path, scenario):
-    """A goal of a message has the time of its job; one that came by an action is found there."""
-    about = {"scenario": scenario.text, "scenario_name": "x", "pace": "live"}
-    goals = np.array([1.0, 0.5, 0.0]), np.array([0.5, 0.25, 1.0])
-    writer = BagWriter(tmp_path / "b", about)
-    for topic, kind in KINDS.items():
-        writer.add_topic(topic, kind, False)
+class Jobs:
+    """Writes a bag with goals and states of jobs."""
 
-    def put(topic, moment, message):
-        writer.write(topic, round(1e9 * moment), bytes(serialize_message(message)))
+    def __init__(self, path, scenario):
+        about = {"scenario": scenario.text, "scenario_name": "x", "pace": "live"}
+        self.writer = BagWriter(path, about)
+        for topic, kind in KINDS.items():
+            self.writer.add_topic(topic, kind, False)
 
-    def state(moment, job, number, goal):
+    def put(self, topic, moment, message):
+        self.writer.write(topic, round(1e9 * moment), bytes(serialize_message(message)))
+
+    def state(self, moment, job, number, goal=None):
         message = JobState(system="single", state=number, job=job, object="box")
         message.header.stamp = time_to_ros(moment)
-        message.goal = pose_stamped_to_ros(goal, 0.0)
-        put("/job_state", moment + 0.01, message)
+        if goal is not None:
+            message.goal = pose_stamped_to_ros(goal, 0.0)
+        self.put("/job_state", moment + 0.01, message)
 
+
+def test_a_task_without_a_goal_cannot_be_repeated(tmp_path, scenario):
+    bag = Jobs(tmp_path / "b", scenario)
+    bag.put("/clock", 0.01, Clock(clock=time_to_ros(0.01)))
+    bag.state(0.5, 1, JobState.PLANNING, np.array([1.0, 0.5, 0.0]))
+    bag.state(5.0, 1, JobState.IDLE, np.array([1.0, 0.5, 0.0]))
+    bag.state(7.0, 2, JobState.PUSHING)
+    bag.writer.close()
+    with pytest.raises(CannotRerun, match="push_along, swarm_move"):
+        run_of_bag(tmp_path / "b")
+
+
+def test_goals_are_found_with_the_stamps_of_their_jobs(tmp_path, scenario):
+    """A goal of a message has the time of its job; one that came by an action is found there."""
+    goals = np.array([1.0, 0.5, 0.0]), np.array([0.5, 0.25, 1.0])
+    bag = Jobs(tmp_path / "b", scenario)
+    put, state = bag.put, bag.state
     put("/clock", 0.01, Clock(clock=time_to_ros(0.01)))
     put("/goal_pose", 1.0, pose_stamped_to_ros(goals[0], 0.0))
     state(0.98, 1, JobState.PLANNING, goals[0])
     state(5.0, 1, JobState.IDLE, goals[0])
     state(7.0, 2, JobState.PLANNING, goals[1])
     put("/clock", 9.0, Clock(clock=time_to_ros(9.0)))
-    writer.close()
+    bag.writer.close()
     run = run_of_bag(tmp_path / "b")
     assert run.system == "single" and not run.repeatable and run.end == pytest.approx(9.0)
     first, second = run.inputs

@@ -23,8 +23,9 @@ def teams():
     return load_scenario("two-singles")
 
 
-def write_bag(folder, scenario, namespace="/a/", count=50):
-    """Robots that go right, boxes ahead of them; south is told a goal, north is not."""
+def write_bag(folder, scenario, namespace="/a/", count=50, later=None):
+    """Robots that go right, boxes ahead of them; south is told a goal, north is not. later: what
+    south says at the end."""
     from rclpy.serialization import serialize_message
 
     meta = {
@@ -53,6 +54,8 @@ def write_bag(folder, scenario, namespace="/a/", count=50):
         put("epuck2/controller/status", moment, status)
     state.header.stamp = time_to_ros(1.5)
     put("south/job_state", 1.5, state)
+    if later is not None:
+        put("south/job_state", 1.55, later)
     put("north/job_state", 1.6, JobState(state_name="IDLE", reason="no goal", object="box2"))
     writer.close()
 
@@ -101,6 +104,13 @@ def test_contents_by_team(tmp_path, teams):
     assert np.allclose(contents.status["epuck2"]["error_y"], 0.001 * np.arange(50))
     end = teams.objects["box1"][1] + [0.49, 0.0, 0.0]
     assert np.allclose(contents.poses["box1"][-1], end)
+
+
+def test_a_task_without_a_goal_does_not_have_that_of_the_job_before(tmp_path, teams):
+    """The report would otherwise tell how far from it the object is."""
+    write_bag(tmp_path / "bag", teams, later=JobState(state_name="PUSHING", object="box1", job=2))
+    job = load(tmp_path / "bag").jobs["/a/south/"]
+    assert job.goal is None and [s.goal is None for s in job.states] == [False, True]
 
 
 def test_a_bag_without_scenario_is_refused(tmp_path):

@@ -61,6 +61,18 @@ class Owner:
         self.executed += 1
 
 
+class Planner(Owner):
+    """Is busy, too, while its plan waits to be executed, as the supervisor is."""
+
+    def take_goal(self, goal, plan_only):
+        super().take_goal(goal, plan_only)
+        self.busy = True
+
+    def execute(self):
+        super().execute()
+        self.plan_ready = False
+
+
 class Choice(Owner):
     """Pushes a crate, too, but not beyond x = 3."""
 
@@ -231,6 +243,62 @@ def test_another_object_a_plan_that_waits_and_cancel(client):
     assert client.result(answer)[1].error_code == JobError.CANCELED
     called = cancel.call_async(Trigger.Request())
     assert client.spinner.until(called.done, 15.0) and not called.result().success
+
+
+@pytest.fixture
+def planner(ros):
+    client = Client(Planner())
+    yield client
+    client.spinner.close()
+
+
+def plan(client):
+    """Somebody waits for the plan to a goal."""
+    answer = client.send(GOAL, plan_only=True)
+    assert client.spinner.until(lambda: client.owner.plan_ready, 15.0)
+    return answer
+
+
+def modes(client):
+    """Whether each job that was taken ends with its plan."""
+    return [plan_only for _, plan_only in client.owner.taken]
+
+
+@pytest.mark.parametrize("by", ["topic", "action"])
+def test_a_goal_whose_plan_waits_is_pursued_when_it_comes_to_be_executed(planner, by):
+    """FAULTS 28 does not hold for it: planning alone is not what is asked."""
+    waits = plan(planner)
+    if by == "topic":
+        planner.publish(GOAL)
+    else:
+        answer = planner.send(GOAL)
+    assert planner.result(waits)[1].error_code == JobError.PREEMPTED
+    assert planner.spinner.until(lambda: planner.state.job == 2, 15.0)
+    assert modes(planner) == [True, False] and planner.owner.busy and not planner.owner.plan_ready
+    if by == "action":
+        planner.owner.end_job(JobError.NONE, "done")
+        assert planner.result(answer)[0] == GoalStatus.STATUS_SUCCEEDED
+
+
+def test_a_plan_alone_of_the_goal_that_is_pursued_ends_the_pursuit(planner):
+    planner.publish(GOAL)
+    plan(planner)
+    assert modes(planner) == [False, True]
+
+
+def test_after_execute_the_goal_is_pursued_and_sent_again_changes_nothing(planner):
+    waits = plan(planner)
+    again = plan(planner)
+    assert planner.result(waits)[1].error_code == JobError.PREEMPTED  # the client, not the job
+    assert modes(planner) == [True]
+    execute = planner.node.create_client(Trigger, "/red/execute")
+    assert planner.spinner.until(execute.service_is_ready, 15.0)
+    called = execute.call_async(Trigger.Request())
+    assert planner.spinner.until(called.done, 15.0) and called.result().success
+    planner.publish(GOAL)
+    assert modes(planner) == [True] and planner.owner.busy and planner.state.job == 1
+    planner.owner.end_job(JobError.NONE, "done")
+    assert planner.result(again)[0] != GoalStatus.STATUS_SUCCEEDED, "it was taken over"
 
 
 def test_a_goal_of_another_object_where_the_owner_has_a_choice(ros):
