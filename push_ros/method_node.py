@@ -369,6 +369,7 @@ class MethodNode(Node):
             "robots": f"{seen} of {len(self.robots)} seen",
             **(self.method.facts() if self.method is not None else {}),
             "poses refused": self._poses.gate.refused,
+            "commands not finite": getattr(self._commander, "not_finite", 0),
             "warning": "no poses" if self._poses.pose(self.object) is None else "",
         }
 
