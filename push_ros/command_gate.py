@@ -22,7 +22,7 @@ class Limits:
     twist: ``(n, 3)`` [m/s, m/s, rad/s] greatest absolute values; a second column of 0 stands for a
         robot that cannot move sideways.
     torque: ``(n,)`` [Nm] of a wheel; 0 for a robot that takes none.
-    age: [s] of the poses that a command answers, and of the newest command while it drives.
+    age: [s] of the poses that a command answers, when it comes and as long as it drives.
     wall: [s] of wall time since the newest command while it drives; inf to go by stamps alone.
     """
 
@@ -58,7 +58,8 @@ class CommandGate:
         n = len(self.names)
         self.driving = np.zeros(n, dtype=bool)
         """``(n,)`` whether the robot's last command was to move, and still holds."""
-        self._last, self._last_wall = np.zeros(n), np.zeros(n)
+        self._answered = np.zeros(n)  # [s] stamp of the newest frame that a command answers
+        self._last_wall = np.zeros(n)  # [s] when the last command came
 
     def rows(self, names: Sequence[str]) -> Rows:
         """``(k,)`` the rows of robots, -1 for those that are not known."""
@@ -78,7 +79,8 @@ class CommandGate:
         wall: float,
         fixed_frame: bool = False,
     ) -> Admitted:
-        """Check the twists ``(k, 3)`` [m/s, m/s, rad/s] of one message.
+        """Check the twists ``(k, 3)`` [m/s, m/s, rad/s] of one message. One that answers an older
+        frame than the robot's last command may only stop it.
 
         stamp: [s] of the poses that it answers; now: [s] on the same clock; wall: [s] monotonic.
         fixed_frame: the twists are given in the world's frame, not in each robot's.
@@ -88,8 +90,14 @@ class CommandGate:
             return Admitted(rows, np.zeros((0, 3)), refused)
         # the usual case first; a NaN is not within limits either
         within = (np.abs(twists) <= self.limits.twist[rows]).all()
-        if self._distinct and within and (not fixed_frame or self._holonomic[rows].all()):
-            return self._take(rows, twists, None, now, wall, refused)
+        in_order = (stamp >= self._answered[rows]).all()
+        if (
+            self._distinct
+            and within
+            and in_order
+            and (not fixed_frame or self._holonomic[rows].all())
+        ):
+            return self._take(rows, twists, None, stamp, wall, refused)
         good = rows >= 0
         if not self._distinct:
             refused += _complain("unknown or named twice", names, ~(good & _first(rows)))
@@ -104,7 +112,8 @@ class CommandGate:
         absurd = good & (np.abs(twists) > self.limits.twist[rows]).any(axis=1)
         refused += _complain("absurd", names, absurd, twists)
         good &= ~absurd
-        return self._take(rows, twists, good, now, wall, refused)
+        good = self._in_order(names, rows, twists, good, stamp, refused)
+        return self._take(rows, twists, good, stamp, wall, refused)
 
     def admit_torques(
         self, name: str, torques: Array, stamp: float, now: float, wall: float
@@ -121,11 +130,12 @@ class CommandGate:
         good &= numbers
         absurd = good & (np.abs(values) > self.limits.torque[rows][:, None]).any(axis=1)
         refused += _complain("absurd", [name], absurd, values)
-        return self._take(rows, values, good & ~absurd, now, wall, refused)
+        good = self._in_order([name], rows, values, good & ~absurd, stamp, refused)
+        return self._take(rows, values, good, stamp, wall, refused)
 
     def silent(self, now: float, wall: float) -> Rows:
         """``(k,)`` rows of robots that drive without a fresh command; they count as stopped."""
-        late = now - self._last > self.limits.age + _TIME_TOLERANCE
+        late = now - self._answered > self.limits.age + _TIME_TOLERANCE
         late |= wall - self._last_wall > self.limits.wall
         late &= self.driving
         if not late.any():
@@ -147,19 +157,34 @@ class CommandGate:
             ]
         return self.rows(names), []
 
+    def _in_order(
+        self,
+        names: Sequence[str],
+        rows: Rows,
+        values: Array,
+        good: Mask,
+        stamp: float,
+        refused: list[str],
+    ) -> Mask:
+        """Those of the good ones that answer no older frame than the last command, or stop."""
+        late = good & (stamp < self._answered[rows]) & (values != 0.0).any(axis=1)
+        refused += _complain("answers an older frame than the last command", names, late)
+        return good & ~late
+
     def _take(
         self,
         rows: Rows,
         values: Array,
         good: Mask | None,
-        now: float,
+        stamp: float,
         wall: float,
         refused: list[str],
     ) -> Admitted:
         if good is not None:
             rows, values = rows[good], values[good]
         self.driving[rows] = (values != 0.0).any(axis=1)
-        self._last[rows], self._last_wall[rows] = now, wall
+        self._answered[rows] = np.maximum(self._answered[rows], stamp)
+        self._last_wall[rows] = wall
         return Admitted(rows, values, refused)
 
 

@@ -134,9 +134,8 @@ def test_no_command_stops_the_robot(arena, monkeypatch):
     monkeypatch.setattr(intake, "watch", watch)
     last = arena.stamp  # the newest command is not younger
     assert arena.until(lambda: not arena.moves("one"), arena.see)
-    # A command is taken until it is this old, and holds as long again; no look of the bridge after
-    # that lets the robot drive, however slow the machine is.
-    limit = last + 2.0 * arena.bridge.settings.command_timeout + 0.01
+    # No look of the bridge after that lets the robot drive, however slow the machine is.
+    limit = last + arena.bridge.settings.command_timeout + 0.01
     assert looks and not any(driving for now, driving in looks if now > limit)
 
 

@@ -74,6 +74,43 @@ def test_who_drives_on_an_old_command_is_silent_once():
     assert g.silent(1.22, 0.0).size == 0 and g.driving.tolist() == [False, False, True]
 
 
+def test_a_command_holds_from_the_frame_that_it_answers_not_from_when_it_came():
+    g = gate(age=0.2)
+    admit(g, ["a"], [[0.1, 0, 0]], 1.0, 1.19)
+    assert g.silent(1.2, 0.0).size == 0
+    assert g.silent(1.21, 0.0).tolist() == [0] and not g.driving.any()
+    g.admit_torques("b", np.array([1.0, 1.0]), 1.0, 1.19, 0.0)
+    assert g.silent(1.21, 0.0).tolist() == [1]
+
+
+def test_a_motion_that_answers_an_older_frame_than_the_last_command_is_refused():
+    g = gate()
+    admit(g, ["a"], [[0, 0, 0]], 1.1, 1.1)
+    late = admit(g, ["a", "disc"], [[0.1, 0, 0], [0.1, 0, 0]], 1.0, 1.11)
+    assert late.rows.tolist() == [2] and not g.driving[0]
+    assert late.refused == ["answers an older frame than the last command: a"]
+    again = admit(g, ["a"], [[0.2, 0, 0]], 1.1, 1.12)
+    assert again.rows.tolist() == [0] and g.driving[0], "of one frame, the last command counts"
+    g.admit_torques("b", np.array([1.0, 1.0]), 1.1, 1.1, 0.0)
+    late = g.admit_torques("b", np.array([2.0, 2.0]), 1.0, 1.11, 0.0)
+    assert late.rows.size == 0 and len(late.refused) == 1
+
+
+def test_a_late_order_to_stand_is_obeyed_and_does_not_let_older_motions_in():
+    g = gate()
+    admit(g, ["a"], [[0.1, 0, 0]], 1.1, 1.1)
+    assert admit(g, ["a"], [[0, 0, 0]], 1.0, 1.11).rows.tolist() == [0] and not g.driving[0]
+    assert admit(g, ["a"], [[0.1, 0, 0]], 1.05, 1.12).rows.size == 0
+
+
+def test_after_the_clock_has_gone_back_commands_with_its_stamps_are_taken():
+    g = gate()
+    admit(g, ["a"], [[0.1, 0, 0]], 50.0, 50.0)
+    g.restart()
+    assert admit(g, ["a"], [[0.1, 0, 0]], 0.5, 0.5).rows.tolist() == [0]
+    assert g.silent(0.7, 0.0).size == 0 and g.silent(0.71, 0.0).tolist() == [0]
+
+
 def test_wall_time_counts_when_sim_time_crawls():
     g = gate(wall=0.5)
     admit(g, ["a"], [[0.1, 0, 0]], 1.0, 1.0, wall=100.0)
