@@ -169,7 +169,8 @@ class CommandGate:
         """Those of the good ones that answer no older frame than the last command, or stop."""
         late = good & (stamp < self._answered[rows]) & (values != 0.0).any(axis=1)
         refused += _complain("answers an older frame than the last command", names, late)
-        return good & ~late
+        in_order: Mask = good & ~late
+        return in_order
 
     def _take(
         self,
