@@ -33,13 +33,15 @@ def guarded(trial: Trial, task: Any) -> Row:
 def crashed(task: Any, reason: str) -> Row:
     """The row of a trial that has no end of its own; it is run again when a study goes on.
 
-    It says what was tried: scenario, seed and, where methods are compared, the method.
+    It says what was tried: all fields of the task that are texts, numbers or truth values, under
+    their names. A field that tells cells of a study apart must therefore have the name of its
+    column in the rows. The folder ``out`` and the ``digest`` of files are left out.
     """
-    method = {"method": task.method} if hasattr(task, "method") else {}
+    tried = {k: v for k, v in vars(task).items() if isinstance(v, (str, int, float))}
+    for name in ("out", "digest"):
+        tried.pop(name, None)
     return {
-        "scenario": getattr(task, "scenario", ""),
-        "seed": getattr(task, "seed", None),
-        **method,
+        **tried,
         "success": False,
         "reason": reason,
         "crashed": True,

@@ -111,18 +111,18 @@ def run_study(name: str, options: StudyOptions) -> dict[str, Any]:
         rows = run_trials(
             what.trial, tasks, options.out / "trials.jsonl", options.scheduler, options.workers
         )
+        if rows:
+            _write_table(options.out / "trials.csv", rows)
         summary = {
             **mark,
             "revision": revision(),
             "requested": len(tasks),
             "trials": [known(row) for row in rows],
-            "aggregate": aggregate(rows, statistics_of(what, rows)),
+            "aggregate": aggregate(rows),
         }
-        (options.out / "summary.json").write_text(
-            json.dumps(summary, indent=1, allow_nan=False) + "\n"
-        )
-        if rows:
-            _write_table(options.out / "trials.csv", rows)
+        _write_summary(options.out, summary)  # also where the statistics fail
+        summary["aggregate"] = aggregate(rows, statistics_of(what, rows))
+        _write_summary(options.out, summary)
         what.conclude(options, tasks, rows)
     return summary
 
@@ -205,6 +205,10 @@ def _alone(out: Path) -> Iterator[None]:
                 "another --out"
             ) from error
         yield
+
+
+def _write_summary(out: Path, summary: Mapping[str, Any]) -> None:
+    (out / "summary.json").write_text(json.dumps(summary, indent=1, allow_nan=False) + "\n")
 
 
 def _write_table(path: Path, rows: list[Row]) -> None:

@@ -13,7 +13,8 @@ def aggregate(rows: list[Row], statistics: Mapping[str, Any] | None = None) -> d
     """Success as a fraction; mean, standard deviation and maximum of every measure; statistics.
 
     A measure that is not finite in a row is left out of its mean; one that is nowhere finite is
-    None. statistics: further values by name, e.g. ``ranksum_p``; they may be nested.
+    None. A trial that crashed counts as a failure and has no measures. statistics: further values
+    by name, e.g. ``ranksum_p``; they may be nested.
 
     Raises
     ------
@@ -23,14 +24,15 @@ def aggregate(rows: list[Row], statistics: Mapping[str, Any] | None = None) -> d
         "trials": len(rows),
         "success": sum(bool(r["success"]) for r in rows) / len(rows) if rows else 0.0,
     }
+    measured = [r for r in rows if not r.get("crashed")]
     names = [
         k
-        for r in rows
+        for r in measured
         for k, v in r.items()
         if isinstance(v, (int, float)) and not isinstance(v, bool) and k != "seed"
     ]
     for name in dict.fromkeys(names):
-        values = np.array([r[name] for r in rows if name in r], dtype=np.float64)
+        values = np.array([r[name] for r in measured if name in r], dtype=np.float64)
         values = values[np.isfinite(values)]
         result[name] = None
         if values.size:

@@ -193,7 +193,7 @@ def statistics(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Share of intervals that hold and median width, by kind of push and quantity."""
     found: dict[str, Any] = {}
     for kind in KINDS:
-        mine = [r for r in rows if r["kind"] == kind and "latency_ratio" in r]
+        mine = [r for r in rows if r.get("kind") == kind and "latency_ratio" in r]
         for q in QUANTITIES:
             if mine:
                 held = float(np.mean([r[f"{q}_holds"] for r in mine]))
@@ -206,8 +206,8 @@ def conclude(options: StudyOptions, tasks: Sequence[CalibrationTask], rows: list
     """The table of calibration."""
     found = statistics(rows)
     for kind in KINDS:
-        count = sum(r["kind"] == kind for r in rows)
-        short = sum(r["kind"] == kind and not r["success"] for r in rows)
+        count = sum(r.get("kind") == kind for r in rows)
+        short = sum(r.get("kind") == kind and not r["success"] for r in rows)
         print(f"\n{count} {kind} pushes, {short} of them shorter than {0.9 * WAY:.1f} m")
         print(f"{'quantity':20}{'held':>8}{'width':>8}   (asked: >= 0.93 and <= 0.33)")
         for q in QUANTITIES:

@@ -210,13 +210,14 @@ def statistics(rows: list[Row]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for kind in KINDS:
         some = [r for r in rows if r.get("kind") == kind]
+        if not some:
+            continue
+        found[kind] = {"trials": len(some), "successes": sum(bool(r["success"]) for r in some)}
         done = [r for r in some if "changed_at_s" in r]
         if not done:
             continue
         p = [r["position_error_m"] for r in done]
-        found[kind] = {
-            "trials": len(some),
-            "successes": sum(bool(r["success"]) for r in some),
+        found[kind] |= {
             "position_median_m": float(np.median(p)),
             "position_worst_m": float(np.max(p)),
             "new_plans": sum(int(r["replans"]) for r in done),
@@ -228,9 +229,11 @@ def statistics(rows: list[Row]) -> dict[str, Any]:
 def conclude(options: StudyOptions, tasks: Sequence[ChangeTask], rows: list[Row]) -> None:
     """How many end at the goal, and what it cost."""
     for kind, mine in statistics(rows).items():
+        print(f"{kind}: {mine['successes']} of {mine['trials']} at the goal")
+        if "position_median_m" not in mine:
+            continue
         print(
-            f"{kind}: {mine['successes']} of {mine['trials']} at the goal, "
-            f"{1e3 * mine['position_median_m']:.2f} mm median, "
+            f"  {1e3 * mine['position_median_m']:.2f} mm median, "
             f"{1e3 * mine['position_worst_m']:.2f} most; {mine['new_plans']} new plans, "
             f"{mine['collision_ticks']} ticks with a collision"
         )

@@ -28,30 +28,30 @@ _MEASURES = ("position_error_m", "orientation_error_rad")
 
 @dataclass(frozen=True)
 class LatencyTask(TrackingTask):
-    """A push. latency: [s]; known: whether the nodes know it, otherwise they believe in none."""
+    """A push. latency_s: [s]; known: whether the nodes know it, otherwise they believe in none."""
 
-    latency: float = 0.0
+    latency_s: float = 0.0
     known: bool = True
 
     @property
     def doubt(self) -> Uncertainty:
         """What the nodes do not know."""
-        believed = self.latency if self.known else 0.0
-        late = (self.latency, self.latency)
+        believed = self.latency_s if self.known else 0.0
+        late = (self.latency_s, self.latency_s)
         return replace(super().doubt, latency=late, believed_latency=believed)
 
     @property
     def trace(self) -> Path:
         """Where its push is kept."""
         path = super().trace
-        return path.with_name(f"{path.stem}-{1e3 * self.latency:.0f}ms-{int(self.known)}.npz")
+        return path.with_name(f"{path.stem}-{1e3 * self.latency_s:.0f}ms-{int(self.known)}.npz")
 
 
 def tasks(options: StudyOptions) -> list[LatencyTask]:
     """Every trajectory, number of robots and latency, with as many seeds as there are trials."""
     options = replace(options, world=options.world or OPTIONS["world"])
     return [
-        LatencyTask(**vars(task), latency=latency, known=known)
+        LatencyTask(**vars(task), latency_s=latency, known=known)
         for task in group_tracking.tasks(options)
         for latency, known in CELLS
         if task.placement == "even"
@@ -61,7 +61,7 @@ def tasks(options: StudyOptions) -> list[LatencyTask]:
 def trial(task: LatencyTask) -> Row:
     """Go to the places and push."""
     row = group_tracking.trial(task)
-    return row | {"latency_s": task.latency, "known": task.known}
+    return row | {"latency_s": task.latency_s, "known": task.known}
 
 
 def _mine(rows: list[Row], name: str, count: int, latency: float, known: bool) -> list[Row]:

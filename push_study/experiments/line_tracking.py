@@ -80,13 +80,13 @@ _PATIENT = {
 
 @dataclass(frozen=True)
 class LineTask:
-    """One run. offset [m] phi; variant: key of ``VARIANTS``; digest: of the scenario's text;
+    """One run. offset_m [m] phi; variant: key of ``VARIANTS``; digest: of the scenario's text;
     length [m] of the line."""
 
     scenario: str
     seed: int
     out: str
-    offset: float
+    offset_m: float
     variant: str
     uncertainty: str = "mild"
     digest: str = ""
@@ -96,7 +96,7 @@ class LineTask:
     def trace_file(self) -> Path:
         """Where the run leaves its trace."""
         number = list(VARIANTS).index(self.variant)
-        name = f"{Path(self.scenario).stem}-{self.offset:g}-{number}-{self.seed}"
+        name = f"{Path(self.scenario).stem}-{self.offset_m:g}-{number}-{self.seed}"
         return Path(self.out) / f"trace-{name}.npz"
 
 
@@ -136,7 +136,7 @@ def trial(task: LineTask) -> Row:
 def world_of(task: LineTask) -> tuple[Scenario, Scenario, Row]:
     """What the controller believes, with its settings; the world; what was drawn for it."""
     variant = VARIANTS[task.variant]
-    scenario = aside(load_scenario(task.scenario), task.offset)
+    scenario = aside(load_scenario(task.scenario), task.offset_m)
     believed, world, drawn = uncertainty(task.uncertainty).draw(scenario, task.seed)
     believed = believed.settings(
         "controller",
@@ -184,8 +184,8 @@ def _track(task: LineTask) -> Row:
         "scenario": task.scenario,
         "seed": task.seed,
         "success": bool(good),
-        "reason": f"phi {task.offset:g} m {task.variant}: {1e3 * error:.1f} mm; {why}",
-        "offset_m": task.offset,
+        "reason": f"phi {task.offset_m:g} m {task.variant}: {1e3 * error:.1f} mm; {why}",
+        "offset_m": task.offset_m,
         "variant": task.variant,
         "final_error_m": error,
         "aside_max_m": float(np.abs(in_robot).max()),
@@ -221,7 +221,7 @@ def statistics(rows: list[Row]) -> dict[str, Any]:
     """By variant: mean and worst final error for each offset, and the times of a solve."""
     found: dict[str, Any] = {}
     for variant in VARIANTS:
-        mine = [r for r in rows if r.get("variant") == variant]
+        mine = [r for r in rows if r.get("variant") == variant and "final_error_m" in r]
         if not mine:
             continue
         cell: dict[str, Any] = {
@@ -265,7 +265,7 @@ def _plot(tasks: Sequence[LineTask], out: Path) -> None:
     figure, axes = plt.subplots(len(OFFSETS), 2, figsize=(11, 9), squeeze=False)
     for row, phi in zip(axes, OFFSETS, strict=True):
         for number, variant in enumerate(VARIANTS):
-            chosen = [t for t in tasks if t.offset == phi and t.variant == variant]
+            chosen = [t for t in tasks if t.offset_m == phi and t.variant == variant]
             for task in chosen:
                 if task.trace_file.is_file():
                     _draw(row, np.load(task.trace_file), f"C{number}", variant)

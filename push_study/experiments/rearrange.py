@@ -176,9 +176,8 @@ def _errors(poses: Mapping[str, Array], goals: Mapping[str, Array]) -> Array:
 
 def statistics(rows: Sequence[Row]) -> Mapping[str, Any]:
     """Share of trials in which every box reached its goal, with Wilson's interval."""
-    done = [r for r in rows if "boxes" in r]
-    good = sum(bool(r["success"]) for r in done)
-    return {"executed": good, "of": len(done), "wilson": list(wilson(good, len(done)))}
+    good = sum(bool(r["success"]) for r in rows)
+    return {"executed": good, "of": len(rows), "wilson": list(wilson(good, len(rows)))}
 
 
 def conclude(options: StudyOptions, tasks: Sequence[RearrangeTask], rows: list[Row]) -> None:
@@ -187,10 +186,13 @@ def conclude(options: StudyOptions, tasks: Sequence[RearrangeTask], rows: list[R
         "\nscene        executed  position [mm]: mean, worst  moves  aside  planning [s]  time [s]"
     )
     for name in options.scenarios:
+        count = sum(r.get("scenario") == name for r in rows)
         mine = [r for r in rows if r.get("scenario") == name and "boxes" in r]
-        if not mine:
-            continue
         good = [r for r in mine if r["success"]]
+        if not mine:
+            if count:
+                print(f"{name:12}   0/{count:<3}")
+            continue
         mean = {
             k: float(np.mean([float(r[k]) for r in mine]))
             for k in ("mean_position_error_m", "moves", "moved_aside", "duration_s")
@@ -198,7 +200,7 @@ def conclude(options: StudyOptions, tasks: Sequence[RearrangeTask], rows: list[R
         worst = max(float(r["position_error_m"]) for r in mine)
         plan = float(np.median([float(r["planning_cpu_s"]) for r in mine]))
         print(
-            f"{name:12} {len(good):3}/{len(mine):<3}   {1e3 * mean['mean_position_error_m']:8.2f}, "
+            f"{name:12} {len(good):3}/{count:<3}   {1e3 * mean['mean_position_error_m']:8.2f}, "
             f"{1e3 * worst:.2f}            {mean['moves']:5.1f}  {mean['moved_aside']:5.1f}  "
             f"{plan:6.2f}  {mean['duration_s']:8.0f}"
         )

@@ -158,13 +158,15 @@ def statistics(rows: list[Row]) -> dict[str, Any]:
         mine = [r for r in rows if r["scenario"] == name]
         if mine:
             times = [r["duration_s"] for r in mine if r["success"]]
+            firsts = np.array([r["first_motion_s"] for r in mine if "first_motion_s" in r])
+            firsts = firsts[np.isfinite(firsts)]
             found[name] = {
                 "reached": len(times),
                 "of": len(mine),
                 "wilson": wilson(len(times), len(mine)),
                 "time_mean_s": float(np.mean(times)) if times else math.nan,
                 "time_std_s": float(np.std(times)) if times else math.nan,
-                "first_motion_mean_s": float(np.nanmean([r["first_motion_s"] for r in mine])),
+                "first_motion_mean_s": float(firsts.mean()) if firsts.size else math.nan,
                 "published_mean_s": mean,
                 "published_std_s": std,
                 "published_first_motion_s": moved,

@@ -161,7 +161,9 @@ def conclude(options: StudyOptions, tasks: Sequence[OutlineTask], rows: list[Row
                 mine = _of(rows, believed, arm, name)
                 if not mine:
                     continue
-                reached = f"{sum(r['targets'] for r in mine)} of {len(EXPERIMENT) * len(mine)}"
+                reached = (
+                    f"{sum(r.get('targets', 0) for r in mine)} of {len(EXPERIMENT) * len(mine)}"
+                )
                 values = "".join(_mean(mine, key) for key in _MEASURES[:3])
                 print(f"{name or 'all':17s} {believed:9s} {arm:10s} {reached:10s}{values}")
     _draw(options, rows)
@@ -182,7 +184,8 @@ def _draw(options: StudyOptions, rows: list[Row]) -> None:
     for arm, style in zip(ARMS, ("o--", "s-"), strict=True):
         cells = [_of(rows, believed, arm) for believed in names]
         shares = [
-            np.mean([r["targets"] for r in c]) / len(EXPERIMENT) if c else np.nan for c in cells
+            np.mean([r.get("targets", 0) for r in c]) / len(EXPERIMENT) if c else np.nan
+            for c in cells
         ]
         above.plot(names, 100.0 * np.array(shares), style, label=arm)
         means = [np.mean([r["lambda"] for r in c if "lambda" in r] or [np.nan]) for c in cells]

@@ -175,23 +175,28 @@ def statistics(rows: list[Row]) -> dict[str, Any]:
     far the object slid along the bumper at most."""
     found: dict[str, Any] = {}
     for variant in VARIANTS:
-        mine = [r for r in rows if r.get("variant") == variant and "position_error_m" in r]
+        mine = [r for r in rows if r.get("variant") == variant]
         if not mine:
             continue
-        p, o = (
-            np.array([r[name] for r in mine])
-            for name in ("position_error_m", "orientation_error_rad")
-        )
         found[variant] = {
             "trials": len(mine),
             "successes": sum(bool(r["success"]) for r in mine),
             "as_planned": sum(bool(r["success"]) and r["replans"] == 0 for r in mine),
+        }
+        done = [r for r in mine if "position_error_m" in r]
+        if not done:
+            continue
+        p, o = (
+            np.array([r[name] for r in done])
+            for name in ("position_error_m", "orientation_error_rad")
+        )
+        found[variant] |= {
             "position_mean_m": float(p.mean()),
             "position_worst_m": float(p.max()),
             "orientation_mean_rad": float(o.mean()),
             "orientation_worst_rad": float(o.max()),
-            "pushes_mean": float(np.mean([r["pushes"] for r in mine])),
-            "slid_worst_m": float(max(r["slid_m"] for r in mine)),
+            "pushes_mean": float(np.mean([r["pushes"] for r in done])),
+            "slid_worst_m": float(max(r["slid_m"] for r in done)),
         }
     return found
 
@@ -202,9 +207,12 @@ def conclude(options: StudyOptions, tasks: Sequence[ThreePushTask], rows: list[R
     print("  pushes  slid [mm]")
     for variant, mine in statistics(rows).items():
         n, degrees = mine["trials"], np.rad2deg
+        head = f"{variant:22s} {mine['successes']:3d}/{n:<3d} {mine['as_planned']:6d}/{n:<3d} "
+        if "position_mean_m" not in mine:
+            print(head)
+            continue
         print(
-            f"{variant:22s} {mine['successes']:3d}/{n:<3d} {mine['as_planned']:6d}/{n:<3d} "
-            f"{1e3 * mine['position_mean_m']:7.2f} {1e3 * mine['position_worst_m']:6.2f} "
+            f"{head}{1e3 * mine['position_mean_m']:7.2f} {1e3 * mine['position_worst_m']:6.2f} "
             f"{degrees(mine['orientation_mean_rad']):10.3f} "
             f"{degrees(mine['orientation_worst_rad']):7.3f} {mine['pushes_mean']:7.1f} "
             f"{1e3 * mine['slid_worst_m']:10.1f}"

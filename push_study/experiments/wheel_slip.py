@@ -299,9 +299,10 @@ def statistics(rows: list[Row]) -> dict[str, Any]:
     """By case: means with the constraint and without it, the part of the slip that it takes away,
     and the ratio of the errors, of the means and as the median over the seeds."""
     found: dict[str, Any] = {}
+    done = [r for r in rows if "slip_rms_m_s" in r]
     for case in CASES:
         on, off = (
-            {r["seed"]: r for r in rows if r.get("case") == case and r.get("constraint") is held}
+            {r["seed"]: r for r in done if r.get("case") == case and r.get("constraint") is held}
             for held in (True, False)
         )
         pairs = [(on[seed], off[seed]) for seed in sorted(set(on) & set(off))]
@@ -341,7 +342,7 @@ def conclude(options: StudyOptions, tasks: Sequence[SlipTask], rows: list[Row]) 
             f"{mine['error_without_m']:13.4f}{mine['error_ratio']:9.2f}"
             f"{mine['error_ratio_median']:15.2f}"
         )
-    late = [r["solve_p99_ms"] for r in rows if r.get("constraint")]
+    late = [r["solve_p99_ms"] for r in rows if r.get("constraint") and "solve_p99_ms" in r]
     if late:
         print(f"a solve with the constraint: {max(late):.2f} ms p99 (CPU), worst run")
     _plot(tasks, options.out)

@@ -92,12 +92,12 @@ def _ways(options: StudyOptions, name: str, tasks: Sequence[MapTask]) -> None:
     figure, axes = plt.subplots(2, len(OBJECTS), figsize=(2.6 * len(OBJECTS), 5.4))
     room = load_map(name)
     for task in tasks:
-        ax = axes[0 if task.turned else 1, OBJECTS.index(task.item.removeprefix("transport_"))]
+        ax = axes[0 if task.turned else 1, OBJECTS.index(task.object.removeprefix("transport_"))]
         for box in room.boxes:
             (x, y), (w, h) = box.centre, box.size
             ax.add_patch(Rectangle((x - 0.5 * w, y - 0.5 * h), w, h, color="0.6"))
         if task.trace.is_file():
-            ways, outline = np.load(task.trace)["ways"], load_object(task.item).outline
+            ways, outline = np.load(task.trace)["ways"], load_object(task.object).outline
             for k in np.linspace(0, len(ways) - 1, 12).astype(int):
                 closed = se2.transform(ways[k, 0], np.vstack([outline, outline[:1]]))
                 ax.plot(*closed.T, color="C0", lw=0.6, alpha=0.7)

@@ -34,13 +34,13 @@ _STALLED = 120.0  # [s]
 
 @dataclass(frozen=True)
 class MapTask:
-    """A run. scenario: name of the map; item: of the object; turned: whether headings matter; lost:
+    """A run. scenario: name of the map; object: its name; turned: whether headings matter; lost:
     part of the messages between agents of a decentralised swarm, None for one node for all."""
 
     scenario: str
     seed: int
     out: str
-    item: str
+    object: str
     robots: int
     turned: bool
     world: str
@@ -52,7 +52,7 @@ class MapTask:
     def trace(self) -> Path:
         """Where its ways are kept."""
         kind = "pose" if self.turned else "position"
-        return Path(self.out) / "ways" / f"{self.scenario}-{self.item}-{kind}-{self.seed}.npz"
+        return Path(self.out) / "ways" / f"{self.scenario}-{self.object}-{kind}-{self.seed}.npz"
 
 
 def load_map(name: str) -> EnvironmentSpec:
@@ -77,7 +77,7 @@ def drawn(
 
 def run(task: MapTask) -> Row:
     """To the map's goal, with headings at start and goal at random."""
-    item, robot, room = load_object(task.item), load_robot(ROBOT), load_map(task.scenario)
+    item, robot, room = load_object(task.object), load_robot(ROBOT), load_map(task.scenario)
     start, goal, begin = drawn(task.scenario, item, task.seed, task.robots, task.turned)
     swarm: dict[str, object] = {
         "position_tolerance": REACHED,
@@ -101,7 +101,7 @@ def run(task: MapTask) -> Row:
     row: Row = {
         "scenario": task.scenario,
         "seed": task.seed,
-        "object": task.item,
+        "object": task.object,
         "robots": task.robots,
         "turned": task.turned,
         "success": outcome.success,

@@ -77,7 +77,7 @@ def test_every_offset_has_every_variant_and_a_plot(tmp_path, capsys):
     assert len(tasks) == len(line_tracking.OFFSETS) * len(line_tracking.VARIANTS)
     rows = [
         {
-            "offset_m": t.offset,
+            "offset_m": t.offset_m,
             "variant": t.variant,
             "final_error_m": 0.001,
             "solve_time_ms": 0.1,

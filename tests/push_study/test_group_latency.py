@@ -19,8 +19,8 @@ def test_runs_differ_in_the_latency_alone(tmp_path):
     first = tasks[0].doubt
     for task in tasks:
         doubt = task.doubt
-        assert doubt.latency == (task.latency, task.latency)
-        assert doubt.believed_latency == (task.latency if task.known else 0.0)
+        assert doubt.latency == (task.latency_s, task.latency_s)
+        assert doubt.believed_latency == (task.latency_s if task.known else 0.0)
         same = replace(doubt, latency=first.latency, believed_latency=first.believed_latency)
         assert same == first
 
@@ -36,7 +36,7 @@ def test_a_known_latency_costs_no_accuracy_and_an_unknown_one_does(tmp_path):
         assert found[f"greatest_ratio_{latency}_ms_known"] <= 1.2
     assert found["greatest_ratio_100_ms_unknown"] > 2.0
     turned = {
-        (t.latency, t.known): r["orientation_error_rad"] for t, r in zip(tasks, rows, strict=True)
+        (t.latency_s, t.known): r["orientation_error_rad"] for t, r in zip(tasks, rows, strict=True)
     }
     assert all(turned[cell] < turned[0.0, True] + 1e-3 for cell in group_latency.CELLS if cell[1])
-    assert [r["applied_latency_s"] for r in rows] == pytest.approx([t.latency for t in tasks])
+    assert [r["applied_latency_s"] for r in rows] == pytest.approx([t.latency_s for t in tasks])
