@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from push_model.settings import SettingsError
-from push_record.revision import revision
+from push_record.revision import revision, versions
 from push_study import experiments
 from push_study.cluster import check_cluster
 from push_study.summary import aggregate, known
@@ -106,8 +106,9 @@ def run_study(name: str, options: StudyOptions) -> dict[str, Any]:
     tasks = what.tasks(options)
     mark = {"experiment": name, "seed": options.seed}
     mark |= {option: getattr(options, option) for option in what.OPTIONS}
-    _claim(options.out, mark | {"revision": revision()})
+    mark["revision"] = revision() or f"planar-push {versions().get('planar-push', '')}".strip()
     with _alone(options.out):
+        _claim(options.out, mark)
         rows = run_trials(
             what.trial, tasks, options.out / "trials.jsonl", options.scheduler, options.workers
         )
@@ -115,7 +116,6 @@ def run_study(name: str, options: StudyOptions) -> dict[str, Any]:
             _write_table(options.out / "trials.csv", rows)
         summary = {
             **mark,
-            "revision": revision(),
             "requested": len(tasks),
             "trials": [known(row) for row in rows],
             "aggregate": aggregate(rows),
@@ -177,7 +177,13 @@ def _claim(out: Path, study: dict[str, Any]) -> None:
     """Make the folder this study's, or see that it is."""
     mark = out / "study.json"
     if mark.is_file():
-        there = json.loads(mark.read_text())
+        try:
+            there = dict(json.loads(mark.read_text(encoding="utf-8")))
+        except (ValueError, TypeError) as error:
+            raise FileExistsError(
+                f"{mark} cannot be read ({error}), so the study there cannot be continued; choose "
+                "another --out"
+            ) from None
         for key, value in study.items():
             if there.get(key) != value:
                 raise FileExistsError(
@@ -185,26 +191,34 @@ def _claim(out: Path, study: dict[str, Any]) -> None:
                     f"{value!r}; choose another --out"
                 )
         return
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+    new = out / "study.new"
+    if any(path != new for path in out.iterdir()):
         raise FileExistsError(f"{out} exists already and is not a study; choose another --out")
-    out.mkdir(parents=True, exist_ok=True)
     if not os.access(out, os.W_OK):
         raise SettingsError(f"{out}: this folder cannot be written")
-    mark.write_text(json.dumps(study, indent=1) + "\n")
+    new.write_text(json.dumps(study, indent=1) + "\n", encoding="utf-8")
+    new.replace(mark)
 
 
 @contextmanager
 def _alone(out: Path) -> Iterator[None]:
-    """Nobody else is at the study meanwhile; the system lets go when the process ends."""
-    with (out / "study.json").open() as mark:
-        try:
-            fcntl.flock(mark, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            raise FileExistsError(
-                f"another process writes to the study in {out}; wait for it, or choose "
-                "another --out"
-            ) from error
+    """Make the folder. Nobody else is at its study meanwhile; the system lets go when the process
+    ends."""
+    if out.exists() and not out.is_dir():
+        raise FileExistsError(f"{out} exists already and is not a study; choose another --out")
+    out.mkdir(parents=True, exist_ok=True)
+    folder = os.open(out, os.O_RDONLY)
+    try:
+        fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        os.close(folder)
+        raise FileExistsError(
+            f"another process writes to the study in {out}; wait for it, or choose another --out"
+        ) from error
+    try:
         yield
+    finally:
+        os.close(folder)
 
 
 def _write_summary(out: Path, summary: Mapping[str, Any]) -> None:

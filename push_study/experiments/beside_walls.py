@@ -17,7 +17,7 @@ from push_model.settings import SettingsError
 from push_planner import PlannerSettings, PlanningFailed, PushPlanner, PushScene
 from push_ros.claims import own_domain
 from push_scenario.scenario import Scenario, load_scenario
-from push_study.job import run_job
+from push_study.job import digest, run_job
 from push_study.pool import Row
 from push_study.study import StudyOptions
 from push_study.uncertainty import uncertainty
@@ -34,23 +34,27 @@ _TRIES = 1_000_000  # poses that are drawn
 
 @dataclass(frozen=True)
 class WallTask:
-    """One trial. scenario: room, robot and object."""
+    """One trial. scenario: room, robot and object. digest: of the scenario's text."""
 
     scenario: str
     seed: int
     uncertainty: str = "mild"
+    digest: str = ""
 
 
 def tasks(options: StudyOptions) -> list[WallTask]:
     """Every scenario, as often as there are trials. Raises SettingsError where the robot has no
     flat bumper."""
+    made = []
     for name in options.scenarios:
-        _ = load_scenario(name).robot()[1].flat_bumper
-    return [
-        WallTask(name, seed, options.uncertainty)
-        for name in options.scenarios
-        for seed in range(options.seed, options.seed + options.trials)
-    ]
+        scenario = load_scenario(name)
+        _ = scenario.robot()[1].flat_bumper
+        text = digest(scenario)
+        made += [
+            WallTask(name, seed, options.uncertainty, text)
+            for seed in range(options.seed, options.seed + options.trials)
+        ]
+    return made
 
 
 def drawn_scenario(task: WallTask) -> tuple[Scenario, int]:

@@ -132,11 +132,33 @@ def test_two_processes_are_not_at_one_study_at_once(tmp_path, capsys):
     study["revision"] = revision()
     out.mkdir()
     (out / "study.json").write_text(json.dumps(study))
-    with (out / "study.json").open() as mark:
-        fcntl.flock(mark, fcntl.LOCK_EX)
+    folder = os.open(out, os.O_RDONLY)
+    try:
+        fcntl.flock(folder, fcntl.LOCK_EX)
         assert main(words) == 2
+    finally:
+        os.close(folder)
     assert f"another process writes to the study in {out}" in capsys.readouterr().err
     assert [p.name for p in out.iterdir()] == ["study.json"]
+
+
+@pytest.mark.parametrize("text", ["", '{"experiment": "sin', "[1, 2]", "\x00"])
+def test_a_study_whose_mark_cannot_be_read_is_refused_with_what_to_do(tmp_path, capsys, text):
+    (tmp_path / "study.json").write_text(text)
+    words = ["experiment", "single-robot", "--scenarios", "short", "--trials", "1"]
+    assert main([*words, "--out", str(tmp_path)]) == 2
+    error = capsys.readouterr().err
+    assert "study.json cannot be read" in error and "choose another --out" in error
+    assert [p.name for p in tmp_path.iterdir()] == ["study.json"]
+
+
+def test_a_study_that_died_before_it_had_its_mark_is_begun_anew(tmp_path, monkeypatch):
+    (tmp_path / "study.new").write_text('{"experi')
+    monkeypatch.setattr("push_study.study.run_trials", lambda *args: [])
+    monkeypatch.setattr("push_study.experiments.single_robot.conclude", lambda *args: None)
+    run_study("single-robot", StudyOptions(("short",), 1, 5, tmp_path))
+    assert json.loads((tmp_path / "study.json").read_text())["seed"] == 5
+    assert not (tmp_path / "study.new").exists()
 
 
 def test_a_study_in_which_nothing_succeeds_is_not_complete():

@@ -4,6 +4,7 @@ import dataclasses
 import json
 import math
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,10 +17,12 @@ from push_study.experiments import grasp_selection, grasp_study, group_goals
 from push_study.study import StudyOptions, experiment, experiment_names, run_study, statistics_of
 from push_study.summary import aggregate, by_cell, known
 from push_study.team_run import Outcome, TeamTrace
+from push_study.trials import identity
 from push_study.uncertainty import UNCERTAINTIES
 from sim_bridge.worlds import world_kind
 
 NAMES = experiment_names()
+SCENARIOS = Path(__file__).parents[2] / "config" / "scenarios"
 
 
 def tasks(name, tmp_path, **changes):
@@ -262,6 +265,39 @@ def test_lambda_of_every_swarm_study_is_in_its_aggregate(name):
     elif name not in ("swarm-maps", "swarm-decentralised"):  # which have no Lambda
         (key,) = [k for k in found if k.startswith("lambda_")]
         assert found[key] == pytest.approx(2.0)
+
+
+READ = ["single-robot", "displaced", "changing-world", "goals-in-a-row", "beside-walls"]
+READ += ["line-tracking", "three-push", "wheel-slip", "calibration", "certificate"]
+"""Experiments whose scenarios are files."""
+
+
+@pytest.mark.parametrize("name", READ)
+def test_a_scenario_that_was_edited_makes_other_tasks(name, tmp_path):
+    what, file = experiment(name), tmp_path / "mine.yaml"
+    text = (SCENARIOS / f"{what.SCENARIOS[0]}.yaml").read_text()
+    options = StudyOptions((str(file),), 1, 1, tmp_path, world=what.OPTIONS.get("world", ""))
+
+    def identities():
+        return {identity(task) for task in what.tasks(options)}
+
+    file.write_text(text)
+    first = identities()
+    assert identities() == first
+    file.write_text(text.replace("0.0]}", "0.001]}", 1))  # a robot's heading
+    assert not identities() & first
+
+
+def test_without_git_a_study_is_continued_by_the_same_version_only(tmp_path, monkeypatch):
+    monkeypatch.setattr("push_study.study.experiment", lambda name: Toy({}))
+    monkeypatch.setattr("push_study.study.run_trials", lambda trial, tasks, *rest: [])
+    monkeypatch.setattr("push_study.study.revision", lambda: "")
+    options = StudyOptions(("a",), 1, 3, tmp_path / "out")
+    assert run_study("toy", options)["revision"].startswith("planar-push ")
+    run_study("toy", options)
+    monkeypatch.setattr("push_study.study.versions", lambda: {"planar-push": "99.0"})
+    with pytest.raises(FileExistsError, match=r"this one's is 'planar-push 99\.0'"):
+        run_study("toy", options)
 
 
 def test_a_statistic_does_not_hide_a_measure():
