@@ -6,6 +6,7 @@ drawn in one does not depend on the others.
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from push_gym.settings import EnvSettings, changed_object
 from push_model.arrays import Array, Mask, Rows
 from push_model.drives import TorqueDrive
 from push_model.settings import SettingsError
+from push_model.specs import ObjectSpec
 from sim_bridge.planar_batch import PlanarBatch
 from sim_bridge.planar_world import PlanarSettings
 
@@ -28,6 +30,17 @@ PER_GOAL = 4
 OPTIONS = ("object", "start", "robots", "goal")
 """What the options of a reset may say: another object (a name, or fields that replace its own),
 and poses of the object, of all robots and of the goal."""
+
+
+@dataclass(frozen=True)
+class Beginning:
+    """Of episodes in some rooms. draws: for the object. poses: ``(rooms, robots + 1, 3)``, the
+    object last. goals: ``(rooms, 3)``. World frame [m, m, rad]."""
+
+    item: ObjectSpec
+    draws: Draws
+    poses: Array
+    goals: Array
 
 
 class PushArena:
@@ -46,17 +59,16 @@ class PushArena:
         self.times = np.zeros(count)
         self.headings = settings.orientation_tolerance is not None
         self._speeds = FASTEST * np.array([1.0, 1.0, 10.0])
-        self._build(settings.object_spec)
+        item = settings.object_spec
+        self._build(item, Draws(self.environment, self.robot, item))
 
-    def _build(self, item: Any) -> None:
+    def _build(self, item: ObjectSpec, draws: Draws) -> None:
         s = self.settings
-        self.item = item
-        self._draws = Draws(self.environment, self.robot, item)
         steps = max(1, math.ceil(s.period / s.time_step - 1e-9))
-        self._steps = steps
         physics = PlanarSettings(time_step=s.period / steps)
         robots = [self.robot] * s.robots
         self.world = PlanarBatch(self.count, self.environment, robots, [item], physics)
+        self.item, self._draws, self._steps = item, draws, steps
         self.lever = math.sqrt(item.geometry.inertia_per_mass)
 
     @property
@@ -73,8 +85,15 @@ class PushArena:
     def reset(
         self, rooms: Rows, randoms: list[np.random.Generator], options: dict[str, Any] | None = None
     ) -> None:
-        """Begin anew in some rooms, each with its generator. options: see ``OPTIONS``; an object is
-        that of all rooms from now on.
+        """Begin anew in some rooms, as ``drawn`` says. It raises SettingsError, and then changes
+        nothing."""
+        self.begin(rooms, self.drawn(rooms, randoms, options))
+
+    def drawn(
+        self, rooms: Rows, randoms: list[np.random.Generator], options: dict[str, Any] | None = None
+    ) -> Beginning:
+        """How to begin anew in some rooms, each with its generator. options: see ``OPTIONS``; an
+        object is that of all rooms from then on.
 
         Raises
         ------
@@ -87,27 +106,35 @@ class PushArena:
             if name not in OPTIONS:
                 known = ", ".join(OPTIONS)
                 raise SettingsError(f"options: unknown key '{name}'; known: {known}")
+        item, draws = self.item, self._draws
         if "object" in told:
             item = changed_object(self.item, told["object"])
             if item != self.item:
                 if len(rooms) < self.count:
                     raise SettingsError("options: another object needs a reset of all rooms")
-                self._build(item)
+                draws = Draws(self.environment, self.robot, item)
         n = self.settings.robots
-        poses = np.empty((len(rooms), n + 1, 3))
+        poses, goals = np.empty((len(rooms), n + 1, 3)), np.empty((len(rooms), 3))
         for k, random in enumerate(randoms):
             start = _poses(told, "start", (3,))
-            start = self._draws.object(random) if start is None else start
+            start = draws.object(random) if start is None else start
             robots = _poses(told, "robots", (n, 3))
-            poses[k, :n] = self._draws.robots(random, n, start) if robots is None else robots
+            poses[k, :n] = draws.robots(random, n, start) if robots is None else robots
             goal = _poses(told, "goal", (3,))
-            self.goals[rooms[k]] = self._draws.object(random) if goal is None else goal
+            goals[k] = draws.object(random) if goal is None else goal
             poses[k, n] = start
             if told:
-                self._draws.check(start, "start")
-                self._draws.check(self.goals[rooms[k]], "goal")
-                self._draws.check_robots(poses[k, :n], start)
-        self.world.place(rooms, poses)
+                draws.check(start, "start")
+                draws.check(goals[k], "goal")
+                draws.check_robots(poses[k, :n], start)
+        return Beginning(item, draws, poses, goals)
+
+    def begin(self, rooms: Rows, beginning: Beginning) -> None:
+        """Begin anew in some rooms as it was drawn for them."""
+        if beginning.item != self.item:
+            self._build(beginning.item, beginning.draws)
+        self.world.place(rooms, beginning.poses)
+        self.goals[rooms] = beginning.goals
         self.times[rooms] = 0.0
 
     def step(self, twists: Array, still: Mask | None = None) -> None:

@@ -63,7 +63,7 @@ class PlanarPushEnv(gymnasium.Env[Observation, Any]):
         self.arena = PushArena(1, self.settings)
         self._pushes: Pushes | None = None
         if self.settings.action == "push":
-            self._pushes = Pushes(system, self.arena, self._method)
+            self._pushes = Pushes(system, self.arena, self.arena.item, self._method)
         self.render_mode = render_mode
         self.observation_space = observation_space(self.arena)
         size = action_size(self.settings, self.arena.robot)
@@ -75,11 +75,15 @@ class PlanarPushEnv(gymnasium.Env[Observation, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Begin an episode. options: see ``push_gym.arena.OPTIONS``; raises SettingsError."""
+        """Begin an episode. options: see ``push_gym.arena.OPTIONS``. It raises SettingsError, and
+        then the present episode goes on."""
         super().reset(seed=seed)
-        self.arena.reset(_ROOM, [self.np_random], options)
+        drawn = self.arena.drawn(_ROOM, [self.np_random], options)
+        pushes = None
         if self.settings.action == "push":  # a new method, which remembers nothing
-            self._pushes = Pushes(self._system, self.arena, self._method)
+            pushes = Pushes(self._system, self.arena, drawn.item, self._method)
+        self.arena.begin(_ROOM, drawn)
+        self._pushes = pushes
         seen = self._seen()
         return seen, {"is_success": self._at_goal(seen), "time": 0.0}
 

@@ -64,10 +64,10 @@ class PlanarPushParallelEnv(ParallelEnv[str, Any, Any]):
         """Begin an episode. options: see ``push_gym.arena.OPTIONS``."""
         if seed is not None:
             self._random = seeding.np_random(seed)[0]
-        self.agents = list(self.possible_agents)
         told = dict(options or {})
         told.pop("options", None)  # PettingZoo's own test hands that in
         self.arena.reset(_ROOM, [self._random], told)
+        self.agents = list(self.possible_agents)
         return self._seen(), {agent: {} for agent in self.agents}
 
     def step(self, actions: dict[str, Any]) -> tuple[dict[str, Any], ...]:

@@ -17,6 +17,7 @@ from push_model.belief import Belief
 from push_model.jobs import JobError, JobPhase
 from push_model.occupancy import rasterise
 from push_model.settings import SettingsError
+from push_model.specs import ObjectSpec
 
 METHODS = {"single": "one-robot", "group": "group", "swarm": "swarm"}
 """Names of the methods by system."""
@@ -31,21 +32,24 @@ _OBJECT = "object"
 class Pushes:
     """Carries out pushes in the one room of an arena."""
 
-    def __init__(self, system: str, arena: PushArena, settings: dict[str, object]) -> None:
-        """settings: of the method, nested, as in a scenario. Raises SettingsError."""
+    def __init__(
+        self, system: str, arena: PushArena, item: ObjectSpec, settings: dict[str, object]
+    ) -> None:
+        """item: the object that the room has when a push begins. settings: of the method, nested,
+        as in a scenario. Raises SettingsError."""
         spec = method_spec(METHODS[system])
         if spec is None:
             raise SettingsError(f"the method '{METHODS[system]}' is not installed")
         self._arena, self._names = arena, [f"e{i}" for i in range(arena.settings.robots)]
         robots = dict.fromkeys(self._names, arena.robot)
-        spec.check(robots, arena.item)
+        spec.check(robots, item)
         grid = rasterise(arena.environment)
-        made = Arena(grid, robots, _OBJECT, arena.item, spec.settings(settings))
+        made = Arena(grid, robots, _OBJECT, item, spec.settings(settings))
         try:
             self._method: Method = spec.make(made)
         except Unsuited as error:
             raise SettingsError(str(error)) from None
-        self._belief = Belief({_OBJECT: arena.item}, robots)
+        self._belief = Belief({_OBJECT: item}, robots)
         self._time = 0.0
         self._steps = max(1, round(_TICK / arena.world.time_step))
 

@@ -79,8 +79,8 @@ class PlanarPushVectorEnv(VectorEnv[Observation, Any, Any]):
             for i, one in enumerate(seeds):
                 if one is not None:
                     self._randoms[i] = seeding.np_random(one)[0]
-        self._ended[:] = False
         self.arena.reset(np.arange(self.num_envs), self._randoms, options)
+        self._ended[:] = False
         seen = observed(self.arena)
         there = self.arena.reached(seen["achieved_goal"], seen["desired_goal"])
         return seen, {"is_success": there, "time": self.arena.times.copy()}

@@ -217,6 +217,58 @@ def test_wrong_options_are_named(options, told):
         make("Single").reset(seed=1, options=options)
 
 
+REFUSED = [
+    {"object": "plate_square", "start": [9.0, 9.0, 0.0]},
+    {"object": "plate_square", "goal": [9.0, 9.0, 0.0]},
+    {"object": "plate_square", "start": ["a", 0.0, 0.0]},
+    {"goal": [9.0, 9.0, 0.0]},
+    {"start": [0.0, 0.0, 0.0], "robots": [[0.01, 0.0, 0.0]]},
+    {"object": {"shape": {"rectangle": {"width": 3.0, "height": 3.0}}}},
+]
+
+
+def state(arena):
+    world = arena.world
+    return [arena.item, world, *(a.tolist() for a in (world.poses, arena.goals, arena.times))]
+
+
+@pytest.mark.parametrize("options", REFUSED)
+@pytest.mark.parametrize("kind", ["one", "vector", "agents"])
+def test_a_refused_reset_changes_nothing(options, kind):
+    if kind == "agents":
+        env = parallel_env("single")
+    else:
+        env = make("Single").unwrapped if kind == "one" else vector("Single", 3).unwrapped
+    env.reset(seed=1)
+    before = state(env.arena)
+    with pytest.raises(SettingsError):
+        env.reset(seed=2, options=options)
+    assert state(env.arena) == before
+    if kind == "agents":
+        env.step({"robot_0": np.array([0.1, 0.0])})
+    else:
+        env.step(np.zeros(env.action_space.shape))
+    seen, _ = env.reset(seed=1)
+    fresh, _ = type(env)(*([3] if kind == "vector" else []), "single").reset(seed=1)
+    for key, value in seen.items():
+        assert np.array_equal(value, fresh[key]), key
+
+
+def test_a_refused_reset_does_not_revive_episodes_that_have_ended():
+    agents, rooms = parallel_env("single", horizon=0.1), vector("Single", 2, horizon=0.1).unwrapped
+    agents.reset(seed=1)
+    rooms.reset(seed=1)
+    agents.step({"robot_0": np.zeros(2)})
+    *_, cut, _ = rooms.step(np.zeros((2, 2)))
+    assert agents.agents == [] and cut.all()
+    for env in (agents, rooms):
+        with pytest.raises(SettingsError):
+            env.reset(options={"goal": [9.0, 9.0, 0.0]})
+    assert agents.agents == []
+    _, _, _, cut, info = rooms.step(np.zeros((2, 2)))
+    assert not cut.any() and (info["time"] == 0.0).all()  # they begin anew
+
+
 def test_draws_leave_room_between_all_bodies():
     """300 resets: nothing overlaps, the object has room for a robot on every side."""
     env = vector("Swarm", 300)

@@ -74,6 +74,16 @@ def test_a_team_that_the_method_cannot_drive_is_refused():
         push_gym.parallel_env("group", action="push")
 
 
+def test_an_object_that_the_method_cannot_push_is_refused_and_changes_nothing():
+    env = gymnasium.make("PlanarPush/Group-v0", action="push").unwrapped
+    env.reset(seed=1)
+    item, poses, method = env.arena.item, env.arena.world.poses.copy(), env._pushes
+    with pytest.raises(SettingsError, match="convex"):
+        env.reset(seed=1, options={"object": "transport_l"})
+    assert env.arena.item is item and env._pushes is method
+    assert np.array_equal(env.arena.world.poses, poses)
+
+
 @pytest.mark.long
 def test_the_example_reaches_its_goals(monkeypatch, capsys):
     monkeypatch.syspath_prepend(str(Path(__file__).resolve().parents[2] / "examples"))
