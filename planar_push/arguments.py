@@ -12,6 +12,7 @@ from pathlib import Path
 
 from push_bringup.job_result import JobEvent
 from push_bringup.systems import SYSTEMS, system_names, system_of
+from push_model.settings import SettingsError
 
 
 def describe(parser: argparse.ArgumentParser, folder: Path, known: Iterable[str]) -> None:
@@ -84,6 +85,21 @@ def add_timeout(
 ) -> None:
     """``--timeout``."""
     parser.add_argument("--timeout", type=positive, default=default, help=words)
+
+
+def add_no_wait(parser: argparse.ArgumentParser, words: str) -> None:
+    """``--no-wait`` and ``--timeout``; ``time_to_wait`` resolves them."""
+    parser.add_argument("--no-wait", action="store_true", help=words)
+    parser.add_argument("--timeout", type=positive, default=None, help="[s] wall time to wait")
+
+
+def time_to_wait(arguments: argparse.Namespace, default: float) -> float:
+    """[s] to follow a job; 0 for ``--no-wait``. Raises SettingsError if both options are given."""
+    if not arguments.no_wait:
+        return float(default if arguments.timeout is None else arguments.timeout)
+    if arguments.timeout is not None:
+        raise SettingsError("--timeout: with --no-wait, the job is not followed; leave one out")
+    return 0.0
 
 
 def add_study(parser: argparse.ArgumentParser) -> None:

@@ -3,11 +3,12 @@
 import argparse
 import sys
 
-from planar_push.arguments import add_namespace, add_timeout, finite, tell
+from planar_push.arguments import add_namespace, add_no_wait, finite, tell, time_to_wait
 from push_bringup.systems import check_namespace
 from push_model.jobs import JobError
 
 _PATIENCE = 10.0  # [s] wall time for the suite to be found
+_TIMEOUT = 300.0  # [s] wall time for the job
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -16,10 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("y", type=finite, help="[m] in the map frame")
     parser.add_argument("theta", type=finite, help="[rad] heading")
     parser.add_argument("--team", default="", help="name of the team, if there are several")
-    parser.add_argument(
-        "--no-wait", action="store_true", help="send the goal and do not follow the job"
-    )
-    add_timeout(parser, 300.0)
+    add_no_wait(parser, "send the goal and do not follow the job")
     add_namespace(parser)
 
 
@@ -29,6 +27,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     check_namespace(arguments.namespace)
     check_namespace(arguments.team)
+    timeout = time_to_wait(arguments, _TIMEOUT)
     with Monitor(arguments.namespace, arguments.team, on_event=tell) as monitor:
         if not monitor.connect(_PATIENCE):
             teams = monitor.teams
@@ -41,9 +40,9 @@ def run(arguments: argparse.Namespace) -> int:
             print(f"error: {monitor.missing()}; {remedy}", file=sys.stderr)
             return 1
         monitor.send_goal((arguments.x, arguments.y, arguments.theta))
-        if arguments.no_wait:
+        if not timeout:
             return 0
-        result = monitor.follow(arguments.timeout)
+        result = monitor.follow(timeout)
     if result.code is JobError.NONE:
         return 0
     code = "" if result.code is None else f" ({result.code.name})"

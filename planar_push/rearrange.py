@@ -3,11 +3,12 @@
 import argparse
 import sys
 
-from planar_push.arguments import add_namespace, add_timeout, finite
+from planar_push.arguments import add_namespace, add_no_wait, finite, time_to_wait
 from push_bringup.systems import check_namespace
 from push_model.settings import SettingsError
 
 _PATIENCE = 10.0  # [s] wall time for the suite to be found
+_TIMEOUT = 1500.0  # [s] wall time for all moves
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -19,10 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="goals of objects, in [m] and [rad] in the map frame; without any, those under "
         "'arrangement' in the scenario that runs",
     )
-    parser.add_argument(
-        "--no-wait", action="store_true", help="send the goals and do not follow the job"
-    )
-    add_timeout(parser, 1500.0)
+    add_no_wait(parser, "send the goals and do not follow the job")
     add_namespace(parser)
 
 
@@ -31,7 +29,7 @@ def run(arguments: argparse.Namespace) -> int:
     from push_bringup.arranger import Arranger
 
     check_namespace(arguments.namespace)
-    goals = _goals(arguments.goals)
+    goals, timeout = _goals(arguments.goals), time_to_wait(arguments, _TIMEOUT)
     with Arranger(arguments.namespace) as arranger:
         if not arranger.connect(_PATIENCE):
             print(
@@ -40,9 +38,9 @@ def run(arguments: argparse.Namespace) -> int:
             )
             return 1
         arranger.send(goals or arranger.arrangement())
-        if arguments.no_wait:
+        if not timeout:
             return 0
-        code, reason = arranger.follow(arguments.timeout, lambda text: print(text, flush=True))
+        code, reason = arranger.follow(timeout, lambda text: print(text, flush=True))
     if not code:
         return 0
     print(f"error: {reason} ({code})", file=sys.stderr)

@@ -324,6 +324,11 @@ def nodes_of(system: str, scenario: Scenario, namespace: str = "") -> tuple[Node
             f"scenario '{scenario.name}' has a trajectory, which only the system 'group' follows; "
             f"give '{system}' a 'goal' or 'goals', or none"
         )
+    if system != "rearrange" and scenario.arrangement:
+        raise SettingsError(
+            f"scenario '{scenario.name}' has an arrangement, which only the system 'rearrange' "
+            f"makes; give '{system}' a scenario without one"
+        )
     return found.nodes(scenario, namespace)
 
 

@@ -11,6 +11,7 @@ from push_gym.arena import PushArena
 from push_gym.picture import picture
 from push_gym.pushes import Pushes
 from push_gym.settings import env_settings
+from push_model.settings import SettingsError
 
 Observation = dict[str, Any]
 _ROOM = np.zeros(1, dtype=np.intp)
@@ -52,7 +53,8 @@ class PlanarPushEnv(gymnasium.Env[Observation, Any]):
         **values: Any,
     ) -> None:
         """system: "single", "group" or "swarm", whose defaults hold. method: settings of the
-        method that carries out actions of the level "push". values: see ``EnvSettings``.
+        method that carries out actions of the level "push"; other levels have none. values: see
+        ``EnvSettings``.
 
         Raises
         ------
@@ -60,6 +62,11 @@ class PlanarPushEnv(gymnasium.Env[Observation, Any]):
         """
         self._system, self._method = system, dict(method or {})
         self.settings = env_settings(system, values)
+        if method is not None and self.settings.action != "push":
+            raise SettingsError(
+                f"method: the level '{self.settings.action}' uses none; leave it out, or choose "
+                "action='push'"
+            )
         self.arena = PushArena(1, self.settings)
         self._pushes: Pushes | None = None
         if self.settings.action == "push":

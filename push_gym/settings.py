@@ -38,7 +38,9 @@ class EnvSettings:
         doc="Reward of a step. With dense, minus the distance from the goal (m), where a turn of "
         "1 rad counts as the object's radius of gyration; with sparse, -1, and 0 at the goal.",
     )
-    period: float = bounded(0.1, low=0.01, high=1.0, doc="Time between two actions (s).")
+    period: float = bounded(
+        0.1, low=0.01, high=1.0, doc="Time between two actions (s); not for pushes."
+    )
     time_step: float = bounded(5e-3, low=1e-4, high=2e-2, doc="Longest physics step (s).")
     horizon: float = bounded(
         60.0, low=0.1, high=1e5, doc="Simulated time after which an episode is truncated (s)."
@@ -91,7 +93,8 @@ def env_settings(system: str, values: Mapping[str, Any]) -> EnvSettings:
 
     Raises
     ------
-    SettingsError: an unknown name, a wrong type, a value out of range.
+    SettingsError: an unknown name, a wrong type, a value out of range, a period for the level
+        "push", whose actions last as long as they need.
     """
     if system not in DEFAULTS:
         raise SettingsError(f"system '{system}': expected one of {', '.join(SYSTEMS)}")
@@ -99,7 +102,12 @@ def env_settings(system: str, values: Mapping[str, Any]) -> EnvSettings:
     for name in values:
         if name not in known:
             raise SettingsError(f"unknown setting '{name}'; known: {', '.join(known)}")
-    return replace(DEFAULTS[system], **values)
+    made = replace(DEFAULTS[system], **values)
+    if made.action == "push" and "period" in values:
+        raise SettingsError(
+            "period: an action of the level 'push' lasts until the push has ended; leave it out"
+        )
+    return made
 
 
 def changed_object(item: ObjectSpec, told: Any) -> ObjectSpec:

@@ -169,6 +169,10 @@ def _check(options: StudyOptions) -> None:
     uncertainty(options.uncertainty)
     if options.world:
         world_kind(options.world)
+    if options.scheduler and options.workers:
+        raise SettingsError(
+            "workers: these are local processes, and with --scheduler there are none; leave one out"
+        )
     if options.scheduler:
         check_cluster()
 
