@@ -26,6 +26,8 @@ class Starter(Protocol):
 
 Request = Callable[[Mapping[str, Any]], dict[str, Any]]
 
+_LONGEST = 1000  # characters of a text
+
 
 class PageRequests:
     """What ``POST`` does. Each request raises NotTaken, or ValueError for a body that is wrong."""
@@ -94,6 +96,12 @@ def _text(values: Mapping[str, Any], name: str, default: str | None = None) -> s
     value = values.get(name, default)
     if not isinstance(value, str):
         raise ValueError(f"{name}: expected text, got {value!r}")
+    if len(value) > _LONGEST:
+        raise ValueError(f"{name}: expected text of at most {_LONGEST} characters")
+    try:
+        value.encode()  # JSON may hold halves of characters; messages and answers may not
+    except UnicodeEncodeError:
+        raise ValueError(f"{name}: expected text of whole characters, got {value!r}") from None
     return value
 
 

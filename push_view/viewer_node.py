@@ -9,6 +9,7 @@ import queue
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from io import BytesIO
 from typing import Any
 
@@ -39,7 +40,7 @@ from push_view.pose_table import PoseTable
 from push_view.suite_watch import SuiteWatch
 from push_view.team_spaces import team_spaces
 from push_view.team_view import TeamView, stamp_text
-from push_view.world_controls import WorldControls
+from push_view.world_controls import Answer, WorldControls
 
 PERIOD = 0.05
 """[s] between two frames that are sent to pages."""
@@ -63,7 +64,7 @@ class ViewerNode(Node):
         self.names = names_of(self)
         self.board = EventBoard()
         self._lock = threading.Lock()
-        self._requests: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._requests: queue.SimpleQueue[tuple[Callable[[], None], Answer]] = queue.SimpleQueue()
         self._teams: dict[str, TeamView] = {}
         self._grid: OccupancyGrid | None = None
         self._maps = 0
@@ -125,7 +126,8 @@ class ViewerNode(Node):
         with self._lock:
             self._last_stamp = max(time.time_ns(), self._last_stamp + 1)
             message = team.goal_message(np.array([x, y, theta]), self._last_stamp)
-        self._requests.put(lambda: team.preview(message) if preview else team.send(message))
+        send = partial(team.preview if preview else team.send, message)
+        self._requests.put((send, lambda good, text: None))
         return stamp_text(message)
 
     def cancel(self, space: str) -> str:
@@ -141,10 +143,14 @@ class ViewerNode(Node):
         """A request to the world, see ``WorldControls``; its answer. Raises NotTaken."""
         return self._wait(lambda answer: self._controls.ask(name, values, answer))
 
-    def _wait(self, ask: Callable[[Callable[[bool, str], None]], None]) -> str:
+    def _wait(self, ask: Callable[[Answer], None]) -> str:
         """Ask in the executor's thread, and wait for the answer in this one."""
         answers: queue.SimpleQueue[tuple[bool, str]] = queue.SimpleQueue()
-        self._requests.put(lambda: ask(lambda good, text: answers.put((good, text))))
+
+        def answer(good: bool, text: str) -> None:
+            answers.put((good, text))
+
+        self._requests.put((lambda: ask(answer), answer))
         try:
             good, text = answers.get(timeout=_ANSWER)
         except queue.Empty:
@@ -237,7 +243,12 @@ class ViewerNode(Node):
     def _work(self) -> None:
         """Carry out the requests of pages; send the newest frame."""
         while not self._requests.empty():
-            self._requests.get()()
+            request, answer = self._requests.get()
+            try:
+                request()
+            except Exception as error:
+                self.get_logger().error(f"a request of a page was not sent: {error}")
+                answer(False, f"not sent: {error}")
         data, self._frame = self._frame, None
         if data is None or self._table is None:
             return

@@ -195,6 +195,52 @@ def test_the_bodies_of_a_world_are_moved_and_killed_by_its_services(page):
     assert len(calls) == 3
 
 
+def offering(page):
+    """A page whose world moves and kills bodies; the requests that reach it."""
+    calls = []
+
+    def answer(request, response):
+        calls.append(request)
+        response.success = True
+        return response
+
+    page.suite.node.create_service(Kill, "/bridge/kill", answer)
+    page.suite.node.create_service(Displace, "/displace", answer)
+    assert page.until(lambda: {"kill", "displace"} <= set(page.node.suite()["offered"]))
+    return calls
+
+
+@pytest.mark.parametrize("name", [r"\ud800", r"box\udcff", "x" * 5000])
+def test_a_name_that_no_message_can_hold_is_refused(page, name):
+    """JSON may hold half of a character, which is no text elsewhere."""
+    calls = offering(page)
+    for path, body in (
+        ("/kill", f'{{"robot": "{name}"}}'),
+        ("/displace", f'{{"name": "{name}", "x": 0.5, "y": 0.0, "theta": 1.0}}'),
+        ("/start", f'{{"system": "{name}", "scenario": "short"}}'),
+        ("/cancel", f'{{"space": "{name}"}}'),
+        ("/goal", json.dumps(GOAL)[:-1] + f', "space": "{name}"}}'),
+    ):
+        status, _, text = page.ask("POST", path, body)
+        assert status == 400 and b"expected text" in text and len(text) < 300
+    assert page.ask("GET", "/suite")[0] == 200 and calls == []
+
+
+def test_a_request_that_cannot_be_sent_is_answered(page, monkeypatch):
+    """Whatever it is, the viewer goes on."""
+    offering(page)
+
+    def fails(*_):
+        raise RuntimeError("the client is broken")
+
+    monkeypatch.setattr(page.node._controls, "ask", fails)
+    status, _, text = page.ask("POST", "/kill", '{"robot": "epuck1"}')
+    assert status == 409 and b"the client is broken" in text
+    monkeypatch.setattr(page.node._teams["/"], "send", fails)
+    assert page.send(**GOAL)[0] == 202
+    assert page.ask("GET", "/suite")[0] == 200
+
+
 def test_what_is_believed_is_listed_with_intervals_and_sources(page):
     beliefs = page.suite.node.create_publisher(Belief, "/belief", BELIEF)
     assert page.until(lambda: beliefs.get_subscription_count() > 0)
