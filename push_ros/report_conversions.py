@@ -13,7 +13,7 @@ from push_model.belief import Belief, BeliefError, Interval
 from push_msgs.msg import Belief as BeliefMessage
 from push_msgs.msg import BelievedOutline
 from push_msgs.msg import Report as ReportMessage
-from push_ros.validation import FRAME, InvalidMessage
+from push_ros.validation import FRAME, InvalidMessage, finite
 
 
 def report_to_ros(report: Report, stamp: Any, method: str, item: str) -> ReportMessage:
@@ -36,11 +36,12 @@ def report_to_ros(report: Report, stamp: Any, method: str, item: str) -> ReportM
 
 
 def report_from_ros(message: ReportMessage) -> Report:
-    """The report of a message.
+    """The report of a message. A CPU time that is not finite becomes 0: it was not measured.
 
     Raises
     ------
-    InvalidMessage: arrays that should be equally long are not, or an unknown kind of shape.
+    InvalidMessage: arrays that should be equally long are not, an unknown kind of shape, or a
+        radius that is not finite.
     """
     figures = (message.figures, message.units, message.values, message.limits)
     shapes = (message.kinds, message.layers, message.counts, message.radii)
@@ -50,6 +51,7 @@ def report_from_ros(message: ReportMessage) -> Report:
     ends = np.cumsum([0, *message.counts])
     if len(message.x) != len(message.y) or ends[-1] != len(points):
         raise InvalidMessage("the number of points of a report must be the sum of its counts")
+    finite(message.radii, "a radius of a report's shapes")
     try:
         kinds = [ShapeKind(int(k)) for k in message.kinds]
     except ValueError as error:
@@ -65,7 +67,7 @@ def report_from_ros(message: ReportMessage) -> Report:
                 kinds, message.layers, message.radii, ends[:-1], ends[1:], strict=True
             )
         ),
-        float(message.solve_time),
+        float(message.solve_time) if math.isfinite(message.solve_time) else 0.0,
     )
 
 

@@ -7,6 +7,7 @@ from push_msgs.msg import Belief as BeliefMessage
 from push_ros.belief_feed import belief_of
 from push_ros.report_conversions import belief_from_ros
 from push_scenario.scenario import Scenario
+from push_view.page_data import short
 
 _MOST = 20  # objects that are listed
 
@@ -53,8 +54,8 @@ class BeliefTable:
             "body": body or "poses",
             "quantity": quantity,
             "unit": QUANTITIES[quantity].unit,
-            "value": float(f"{interval.value:.4g}"),
-            "low": float(f"{interval.low:.4g}"),
-            "high": float(f"{interval.high:.4g}"),
+            "value": short(interval.value, 4),
+            "low": short(interval.low, 4),
+            "high": short(interval.high, 4),
             "source": self._sources.get((body, quantity), "scenario"),
         }

@@ -61,13 +61,13 @@ def rows_json(reports: Iterable[tuple[str, Report]]) -> list[dict[str, Any]]:
         for figure in report.figures:
             row: dict[str, Any] = {"name": figure.name, "text": figure_text(figure)}
             if np.isfinite(figure.value):
-                row.update(value=float(f"{figure.value:.5g}"), unit=figure.unit)
+                row.update(value=short(figure.value), unit=figure.unit)
                 if np.isfinite(figure.limit):
-                    row["limit"] = float(f"{figure.limit:.5g}")
+                    row["limit"] = short(figure.limit)
             rows.append(row)
         if report.solve_time > 0.0:
             text = f"{1e6 * report.solve_time:.0f} µs"
-            value = float(f"{report.solve_time:.3g}")
+            value = short(report.solve_time, 3)
             rows.append({"name": "CPU time of a step", "text": text, "value": value, "unit": "s"})
     return rows
 
@@ -86,6 +86,12 @@ def shapes_json(reports: Iterable[Report]) -> list[dict[str, Any]]:
         for s in report.shapes
         if np.isfinite(s.points).all()
     ]
+
+
+def short(value: float, digits: int = 5) -> float:
+    """A finite number with so many digits; as it is where rounding would exceed all numbers."""
+    rounded = float(f"{value:.{digits}g}")
+    return rounded if math.isfinite(rounded) else float(value)
 
 
 def _path(points: Array) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from push_model.arrays import Array
 from push_record.contents import BagContents, Job, ReportSeries, load
 from push_record.planned import merged
 from push_view.bodies import bodies_of
-from push_view.page_data import obstacles_json, plan_json, rows_json, shapes_json
+from push_view.page_data import obstacles_json, plan_json, rows_json, shapes_json, short
 
 _MOMENTS = 0.25  # [s] between two reports
 _FRAMES = 20_000  # frames that are sent at most
@@ -161,11 +161,11 @@ def _series(
 
 def _one(unit: str, times: Array, values: Array, limit: float = np.nan) -> dict[str, Any]:
     kept = _thinned(values)
-    told = {} if not np.isfinite(limit) else {"limit": float(f"{limit:.5g}")}
+    told = {} if not np.isfinite(limit) else {"limit": short(limit)}
     return {
         "unit": unit,
         "t": np.round(times[kept], 3).tolist(),
-        "v": [float(f"{v:.5g}") for v in values[kept]],
+        "v": [short(v) for v in values[kept]],
         **told,
     }
 

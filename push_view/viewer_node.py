@@ -14,7 +14,6 @@ from io import BytesIO
 from typing import Any
 
 import numpy as np
-import yaml
 from nav_msgs.msg import OccupancyGrid as GridMessage
 from PIL import Image
 from rclpy._rclpy_pybind11 import RCLError
@@ -31,7 +30,7 @@ from push_ros.conversions import grid_from_ros
 from push_ros.names import Names, names_of
 from push_ros.qos import BELIEF, LATCHED, STREAM
 from push_ros.validation import InvalidMessage
-from push_scenario.scenario import Scenario, scenario_from_mapping
+from push_scenario.scenario import Scenario, scenario_from_text
 from push_view.belief_table import BeliefTable
 from push_view.bodies import bodies_of
 from push_view.event_board import EventBoard
@@ -48,7 +47,6 @@ _LOOK = 0.25  # [s] between two checks of the graph
 _SEARCH = 1.0  # [s] between two searches for teams
 _OCCUPIED = 110  # grey
 _ANSWER = 3.0  # [s] that a request is waited for
-_Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 class NotTaken(Exception):
@@ -192,9 +190,8 @@ class ViewerNode(Node):
     def _on_scenario(self, message: String) -> None:
         where = self.names.world("scenario")
         try:
-            values = yaml.load(message.data, Loader=_Loader)
-            scenario = scenario_from_mapping(values, "scenario", where)
-        except (yaml.YAMLError, SettingsError) as error:
+            scenario = scenario_from_text(message.data, "scenario", where)
+        except SettingsError as error:
             self.get_logger().warning(f"refused a scenario: {error}")
             return
         self._show(scenario)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from planar_push.main import main
-from push_msgs.msg import GroupPlan, JobState
+from push_msgs.msg import GroupPlan, JobState, Report
 from push_view.playback import _one, playback_json
 from push_view.playback_server import PlaybackServer
 from tests.push_view.browser import CHROMIUM, Browser
@@ -75,6 +75,31 @@ def test_a_long_series_keeps_its_peaks():
     kept = dict(zip(sent["t"], sent["v"], strict=True))
     assert [kept.get(float(p)) for p in peaks] == [3.0, -2.0, 1.0, 5.0]
     assert "limit" not in _one("m", np.arange(3.0), np.ones(3))
+
+
+def test_extreme_numbers_in_a_bag_are_left_out_or_kept(scenario, tmp_path):
+    """What somebody recorded is a valid message, and need not be valid JSON."""
+    bag = Bag(tmp_path / "bag", crowd(scenario, 1, 1))
+    for i in range(11):
+        bag.poses({"r0": np.zeros(3), "box0": np.zeros(3)}, 1.0 + 0.1 * i)
+    bag.write("/job_state", JobState(system="single", robots=["r0"], object="box0"), 1.0)
+    figure = {"figures": ["f"], "units": ["m"], "values": [1.79769e308], "limits": [1.79769e308]}
+    shape = {"kinds": [0], "layers": ["l"], "counts": [1], "x": [0.0], "y": [0.0]}
+    for k, given in enumerate(
+        (
+            {"solve_time": np.inf, "radii": [0.1]},
+            {"solve_time": 1.79769e308, "radii": [0.1]},
+            {"radii": [np.nan]},
+        )
+    ):
+        message = Report(method="m", phase="push", **figure, **shape, **given)
+        message.header.stamp.sec = 1 + k
+        bag.write("/report", message, 1.5 + 0.1 * k)
+    path = bag.close()
+    data = json.loads(json.dumps(playback_json(path), allow_nan=False))
+    (team,) = data["teams"]
+    assert team["series"]["f"]["v"] == [1.79769e308] * 2 and len(team["moments"][0]) == 2
+    assert main(["report", str(path), "--out", str(tmp_path / "out")]) == 0
 
 
 def test_wrong_arguments_are_told(scenario, tmp_path, capsys):

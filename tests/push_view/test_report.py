@@ -29,6 +29,7 @@ TYPES = {
     "poses": "push_msgs/msg/Poses",
     "contacts": "push_msgs/msg/Contacts",
     "job_state": "push_msgs/msg/JobState",
+    "/report": "push_msgs/msg/Report",
     "controller/status": "push_msgs/msg/ControllerStatus",
 }
 

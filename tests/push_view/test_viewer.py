@@ -262,6 +262,55 @@ def test_what_is_believed_is_listed_with_intervals_and_sources(page):
     assert again == seen["belief"]["rows"], "a belief that cannot be is refused"
 
 
+EXTREME = {
+    "radius": {"kinds": [0], "layers": ["l"], "counts": [1], "radii": [math.nan], "x": [0.0]}
+    | {"y": [0.0]},
+    "solve time": {"solve_time": math.inf},
+    "long solve": {"solve_time": 1.79769e308},
+    "figure": {"figures": ["f"], "units": ["m"], "values": [1.79769e308], "limits": [1.79769e308]},
+}
+"""Fields of valid reports with numbers that JSON does not know, or that rounding makes infinite."""
+
+
+@pytest.mark.parametrize("name", EXTREME)
+def test_a_report_with_extreme_numbers_is_shown_or_refused(page, name):
+    page.suite.states["/"].publish(JobState(system="single", robots=["epuck1"], object="box"))
+    reports = page.suite.node.create_publisher(Report, "/report", STATUS)
+    assert page.until(lambda: reports.get_subscription_count() > 0)
+    for message in (
+        Report(method="extreme", phase="push", **EXTREME[name]),
+        Report(method="plain", phase="push"),
+    ):
+        reports.publish(message)
+        page.until(lambda: False, 0.6)
+    seen = page.events(
+        lambda s: any(r["text"] == "plain" for r in s.get(("panel", "/"), {}).get("rows", []))
+    )
+    assert seen["panel", "/"]["shapes"] == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["environment: 2001-99-99", "environment: &a [*a]\nrobots: *a", "a: " + "[" * 20000],
+)
+def test_a_scenario_that_is_none_is_refused(page, text):
+    before = page.events(lambda s: "bodies" in s)["bodies"]
+    page.suite.scenarios.publish(String(data=text))
+    page.until(lambda: False, 0.5)
+    assert page.events(lambda s: "bodies" in s)["bodies"] == before
+
+
+def test_a_belief_of_extreme_size_is_listed(page):
+    beliefs = page.suite.node.create_publisher(Belief, "/belief", BELIEF)
+    assert page.until(lambda: beliefs.get_subscription_count() > 0)
+    huge = 1.79769e308
+    message = Belief(source="person", bodies=["box"], quantities=["mass"])
+    message.values, message.lows, message.highs = [huge], [0.1], [huge]
+    beliefs.publish(message)
+    page.until(lambda: False, 0.5)
+    assert page.events(lambda s: "belief" in s)["belief"]["rows"]
+
+
 def test_each_team_has_its_state_and_gets_its_own_goals(teams):
     for space, robot in (("/left/", "epuck1"), ("/right/", "other")):
         state = JobState(system="single", robots=[robot], object="box", state_name=robot.upper())
