@@ -7,7 +7,7 @@ from pathlib import Path
 from mcap.reader import make_reader
 
 from push_model.settings import SettingsError
-from push_record.bag import BagWriter, bag_file, is_complete, read_channels, read_metadata, read_raw
+from push_record.bag import BagWriter, bag_file, ending, read_channels, read_metadata, read_raw
 
 _TYPES = {
     ".html": "text/html",
@@ -22,10 +22,11 @@ def attach(bag: Path, files: Sequence[Path]) -> None:
 
     Raises
     ------
-    SettingsError: the bag is cut off.
+    SettingsError: the bag is cut off or damaged.
     """
-    if not is_complete(bag):
-        raise SettingsError(f"{bag}: the file is cut off; copy it first with planar-push recover")
+    trouble = ending(bag).text
+    if trouble:
+        raise SettingsError(f"{bag}: {trouble}; copy it first with planar-push recover")
     beside = bag_file(bag).parent / ".attaching"
     shutil.rmtree(beside, ignore_errors=True)
     writer = BagWriter(beside, read_metadata(bag))

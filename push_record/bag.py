@@ -2,6 +2,7 @@
 little, readable by rosbag2, Foxglove, the ``rosbags`` and the ``mcap`` libraries."""
 
 import contextlib
+import math
 import struct
 import time
 from collections.abc import Iterator, Mapping
@@ -10,17 +11,23 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from mcap.exceptions import McapError
-from mcap.records import Channel, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader
+from mcap.exceptions import McapError, RecordLengthLimitExceeded
+from mcap.records import Channel, DataEnd, Message, Metadata, Schema
+from mcap.stream_reader import CRCValidationError, StreamReader
 from mcap.writer import CompressionType, Writer
+from rosbags.serde import SerdeError
 
+from push_model.settings import SettingsError
 from push_record.interfaces import typestore
 from push_record.older_messages import OlderMessages
 
 _CHUNK = 64 * 1024  # [bytes]
 _FLUSH_EVERY = 1.0  # [s] wall time
 _MAGIC = b"\x89MCAP0\r\n"  # at both ends of a finished file
+_BROKEN = (
+    *(McapError, EOFError, ValueError, struct.error, KeyError),
+    *(OverflowError, MemoryError),  # a length that is damaged
+)
 _MAXIMUM = {"sec": 9223372036, "nsec": 854775807}
 
 
@@ -40,7 +47,12 @@ class BagWriter:
         folder.mkdir(parents=True)
         self.folder = folder
         self._file = (folder / f"{folder.name}_0.mcap").open("wb")
-        self._writer = Writer(self._file, chunk_size=_CHUNK, compression=CompressionType.NONE)
+        self._writer = Writer(
+            self._file,
+            chunk_size=_CHUNK,
+            compression=CompressionType.NONE,
+            enable_data_crcs=True,
+        )
         self._writer.start("ros2", "planar-push")
         self._writer.add_metadata("planar_push", dict(metadata))
         self._metadata = dict(metadata)
@@ -179,29 +191,85 @@ def bag_file(bag: Path) -> Path:
 
 def read_metadata(bag: Path) -> dict[str, str]:
     """Scenario, seed and revision of a bag."""
-    for record in _records(bag):
+    for record in _Records(bag):
         if isinstance(record, Metadata) and record.name == "planar_push":
             return dict(record.metadata)
     return {}
 
 
-def is_complete(bag: Path) -> bool:
-    """Whether the file was finished; not if its writer was killed."""
-    with bag_file(bag).open("rb") as file:
-        file.seek(0, 2)
-        if file.tell() < 2 * len(_MAGIC):
-            return False
-        file.seek(-len(_MAGIC), 2)
-        return file.read() == _MAGIC
+@dataclass(frozen=True)
+class Ending:
+    """Where the reading of a bag ends.
+
+    time: [s] of the last message that can be read; nan if there is none. trouble: ``cut off`` or
+    ``damaged``, empty if the file is whole; text: the same in a sentence.
+    """
+
+    time: float
+    trouble: str
+    text: str
 
 
-def _records(bag: Path) -> Iterator[Any]:
-    """All records, up to the end of a truncated file."""
-    with bag_file(bag).open("rb") as file:
-        try:
-            yield from StreamReader(file).records
-        except (McapError, EOFError, ValueError, struct.error):
-            return
+def ending(bag: Path) -> Ending:
+    """Read a bag to its end, or to where it is cut off or damaged."""
+    records, time = _Records(bag), math.nan
+    for record in records:
+        if isinstance(record, Message):
+            time = 1e-9 * record.log_time
+    where = "before its first message" if math.isnan(time) else f"at {time:.2f} s"
+    text = ""
+    if records.trouble == "cut off":
+        text = f"the file is cut off {where}, for example because the recorder was killed"
+    elif records.somewhere:
+        text = "a part of the file is damaged or missing: its checksum is wrong"
+    elif records.trouble:
+        text = f"the file is damaged {where}; what follows is not read"
+    return Ending(time, records.trouble, text)
+
+
+class _Records:
+    """All records of a file, up to where it is cut off or damaged.
+
+    trouble: as that of ``Ending``, when all records have been read. somewhere: whether the place of
+    the damage is not known.
+    """
+
+    def __init__(self, bag: Path) -> None:
+        self._path = bag_file(bag)
+        self.trouble = ""
+        self.somewhere = False
+
+    def __iter__(self) -> Iterator[Any]:
+        with self._path.open("rb") as file:
+            size = file.seek(0, 2)
+            file.seek(max(0, size - len(_MAGIC)))
+            finished = size >= 2 * len(_MAGIC) and file.read() == _MAGIC
+            file.seek(0)
+            reader = StreamReader(file, validate_crcs=True, record_size_limit=size)
+            try:
+                yield from _known(reader.records)
+            except _BROKEN as error:
+                long = isinstance(error, RecordLengthLimitExceeded)
+                cut = not finished and (long or not file.read(1))
+                self.trouble = "cut off" if cut else "damaged"
+                record = error.record if isinstance(error, CRCValidationError) else None
+                self.somewhere = isinstance(record, DataEnd)
+
+
+def _known(records: Iterator[Any]) -> Iterator[Any]:
+    """Records whose schema and channel are there; raises KeyError at another one."""
+    schemas: set[int] = set()
+    channels: set[int] = set()
+    for record in records:
+        if isinstance(record, Schema):
+            schemas.add(record.id)
+        elif isinstance(record, Channel):
+            if record.schema_id not in schemas:
+                raise KeyError(record.schema_id)
+            channels.add(record.id)
+        elif isinstance(record, Message) and record.channel_id not in channels:
+            raise KeyError(record.channel_id)
+        yield record
 
 
 @dataclass(frozen=True)
@@ -218,7 +286,7 @@ def read_channels(bag: Path) -> list[tuple[str, str, bool]]:
     """Name, type, and whether it is latched, of each topic, in the order of the file."""
     schemas: dict[int, str] = {}
     found: dict[str, tuple[str, str, bool]] = {}
-    for record in _records(bag):
+    for record in _Records(bag):
         if isinstance(record, Schema):
             schemas[record.id] = record.name
         elif isinstance(record, Channel):
@@ -228,19 +296,26 @@ def read_channels(bag: Path) -> list[tuple[str, str, bool]]:
 
 
 def read_bag(bag: Path, topics: set[str] | None = None) -> Iterator[Record]:
-    """Messages in file order; of a truncated bag, those of its complete chunks. Those of another
-    version of this project are converted (older_messages.py)."""
+    """Messages in file order; of a truncated or damaged bag, those of the complete chunks before
+    that. Those of another version of this project are converted (older_messages.py).
+
+    Raises
+    ------
+    SettingsError: a message is none of its type.
+    """
     store = typestore()
     for raw in read_raw(bag, topics):
-        yield Record(raw.topic, raw.stamp, store.deserialize_cdr(raw.data, raw.type))
+        with _readable(bag, raw.topic, raw.stamp):
+            message = store.deserialize_cdr(raw.data, raw.type)
+        yield Record(raw.topic, raw.stamp, message)
 
 
 def read_raw(bag: Path, topics: set[str] | None = None) -> Iterator[RawRecord]:
-    """As ``read_bag``, without deserialising."""
+    """As ``read_bag``, without deserialising messages of the present version."""
     older = OlderMessages()
     schemas: dict[int, str] = {}
     channels: dict[int, tuple[str, str]] = {}
-    for record in _records(bag):
+    for record in _Records(bag):
         if isinstance(record, Schema):
             schemas[record.id] = record.name
             older.define(record.name, record.data.decode(errors="replace"))
@@ -249,21 +324,33 @@ def read_raw(bag: Path, topics: set[str] | None = None) -> Iterator[RawRecord]:
         elif isinstance(record, Message):
             topic, kind = channels[record.channel_id]
             if topics is None or topic in topics:
-                data = older.present(kind, record.data)
+                with _readable(bag, topic, record.log_time):
+                    data = older.present(kind, record.data)
                 yield RawRecord(topic, kind, record.log_time, data)
+
+
+@contextlib.contextmanager
+def _readable(bag: Path, topic: str, stamp: int) -> Iterator[None]:
+    try:
+        yield
+    except (SerdeError, IndexError, OverflowError, MemoryError) as error:
+        raise SettingsError(
+            f"{bag}: the message on {topic} at {1e-9 * stamp:.2f} s cannot be read: {error}"
+        ) from None
 
 
 def older_types(bag: Path) -> list[str]:
     """Message types whose definition in the bag is not the present one."""
     older = OlderMessages()
-    for record in _records(bag):
+    for record in _Records(bag):
         if isinstance(record, Schema):
             older.define(record.name, record.data.decode(errors="replace"))
     return sorted(older.types)
 
 
 def recover(bag: Path, folder: Path) -> int:
-    """Copy the readable part of a truncated bag into a new one; returns the message count."""
+    """Copy the readable part of a truncated or damaged bag into a new one; returns the message
+    count."""
     if folder.exists():
         raise FileExistsError(f"{folder} exists already; choose another folder for the bag")
     writer = BagWriter(folder, read_metadata(bag))

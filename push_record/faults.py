@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from push_model.jobs import JobError
-from push_record.bag import is_complete, older_types, read_bag
+from push_record.bag import ending, older_types, read_bag
 from push_record.collisions import Collisions
 from push_record.contents import BagContents
 
@@ -47,9 +47,9 @@ def faults_of(bag: Path, contents: BagContents) -> list[Fault]:
     for kind in older_types(bag):
         text = "recorded with another version of this message; fields that it lacks are 0 or empty"
         faults.append(Fault(float("nan"), "another version", kind, text))
-    if not is_complete(bag):
-        text = "the file was cut off, for example because the recorder was killed"
-        faults.append(Fault(float("nan"), "cut off", bag.name, text))
+    end = ending(bag)
+    if end.trouble:
+        faults.append(Fault(end.time, end.trouble, bag.name, end.text))
     return faults
 
 
