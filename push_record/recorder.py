@@ -116,7 +116,13 @@ class RecorderNode(Node):
         self.create_subscription(Clock, self._clock_topic, self._on_clock, CLOCK)
 
     def _on_clock(self, message: Clock) -> None:
-        self._sim_time = round(1e9 * time_from_ros(message.clock))
+        time = time_from_ros(message.clock)
+        if time < 0.0:  # a bag knows no such times
+            self.get_logger().warning(
+                f"ignored {self._clock_topic}: {time:.3f} s is before 0", throttle_duration_sec=5.0
+            )
+            return
+        self._sim_time = round(1e9 * time)
 
     def _on_message(self, topic: str, data: bytes) -> None:
         self._last = time.monotonic()

@@ -3,18 +3,19 @@
 import numpy as np
 import pytest
 import rclpy
+from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
 from push_model.settings import SettingsError
 from push_msgs.msg import ControllerStatus, JobState, Poses
-from push_record.bag import BagWriter, read_bag
+from push_record.bag import BagWriter, ending, read_bag
 from push_record.contents import load, until
 from push_record.player import PlayerNode
 from push_record.recorder import RecorderNode, heard_scenario
 from push_record.topics import MANY, recorded_topics, shown_topics
 from push_ros.conversions import pose_stamped_to_ros, poses_to_ros, time_to_ros
 from push_ros.process import Spinner
-from push_ros.qos import LATCHED, STREAM
+from push_ros.qos import CLOCK, LATCHED, STREAM
 from push_scenario.scenario import load_scenario, scenario_from_text
 
 
@@ -111,6 +112,27 @@ def test_a_task_without_a_goal_does_not_have_that_of_the_job_before(tmp_path, te
     write_bag(tmp_path / "bag", teams, later=JobState(state_name="PUSHING", object="box1", job=2))
     job = load(tmp_path / "bag").jobs["/a/south/"]
     assert job.goal is None and [s.goal is None for s in job.states] == [False, True]
+
+
+def test_a_clock_before_zero_does_not_end_the_recording(tmp_path, teams, ros):
+    recorder = RecorderNode(tmp_path / "bag", teams)
+    world = rclpy.create_node("world")
+    clock = world.create_publisher(Clock, "/clock", CLOCK)
+    poses = world.create_publisher(Poses, "/poses", STREAM)
+    spinner = Spinner([recorder, world])
+    try:
+        assert spinner.until(lambda: clock.get_subscription_count() > 0, 5.0)
+        for k, second in enumerate((3, -5)):
+            message = Clock()
+            message.clock.sec = second
+            clock.publish(message)
+            spinner.until(lambda: False, 0.3)
+            poses.publish(poses_to_ros({}, float(second)))
+            assert spinner.until(lambda k=k: recorder.writer.count("/poses") > k, 5.0)
+    finally:
+        spinner.close()
+    stamps = [r.stamp for r in read_bag(tmp_path / "bag", {"/poses"})]
+    assert stamps == [3 * 10**9] * 2 and ending(tmp_path / "bag").trouble == ""
 
 
 def test_a_bag_without_scenario_is_refused(tmp_path):
