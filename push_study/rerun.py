@@ -14,6 +14,7 @@ from push_bringup.node_settings import changed
 from push_bringup.systems import LIVE, nodes_of
 from push_model.settings import SettingsError
 from push_msgs.msg import Belief
+from push_record.bag import ending
 from push_record.compare import Comparison, compare_bags
 from push_record.contents import BagContents, Job, State, load, until
 from push_record.parting import Parting, partings
@@ -87,7 +88,8 @@ def rerun(
     ----------
     bag: recorded by this suite. out: folder of the bag of the re-run, which must not exist.
     parameters: node name to settings that are changed, nested as in a scenario.
-    say: told, before anything runs, in what the set-up differs, and what is run.
+    say: told, before anything runs, what the bag lacks, in what the set-up differs, and what is
+        run.
 
     Raises
     ------
@@ -103,6 +105,9 @@ def rerun(
         raise CannotRerun(f"{bag}: {error}") from None
     if not any(node.traits.owner for node in nodes):
         raise CannotRerun(f"{bag}: the system '{run.system}' has no goals that could be repeated")
+    trouble = ending(bag).text
+    if trouble:
+        say(f"{trouble}; only what can be read is compared")
     setup = changes_of_setup(run)
     for line in setup:
         say(line)

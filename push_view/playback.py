@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from push_model.arrays import Array
+from push_record.bag import ending
 from push_record.contents import BagContents, Job, ReportSeries, load
 from push_record.planned import merged
 from push_view.bodies import bodies_of
@@ -24,13 +25,15 @@ def playback_json(bag: Path, name: str = "") -> dict[str, Any]:
     """A bag as JSON for the page.
 
     name: to call it; that of its folder if it is not given. Poses are integers, in units of 0.1 mm
-    and 1 mrad, as in the live page. Times are seconds of the bag.
+    and 1 mrad, as in the live page. Times are seconds of the bag. trouble:
+    ``cut off`` or ``damaged``, empty if the file is whole.
 
     Raises
     ------
     ValueError: the bag holds no scenario. FileNotFoundError: it is none.
     """
-    return contents_json(load(bag, _MOMENTS), name or bag.name, VALUES)
+    sent = contents_json(load(bag, _MOMENTS), name or bag.name, VALUES)
+    return {**sent, "trouble": ending(bag).trouble}
 
 
 def contents_json(contents: BagContents, name: str, values: int) -> dict[str, Any]:

@@ -102,7 +102,7 @@ export async function begin({bags = [], data = null}) {
     at("trouble").hidden = false; at("trouble").textContent = `the bag cannot be shown: ${error.message}`;
     return;
   }
-  at("title").textContent = recordings.map(r => r.name).join(" | ");
+  at("title").textContent = recordings.map(r => r.trouble ? `${r.name} (${r.trouble})` : r.name).join(" | ");
   at("hint").textContent = matchMedia("(pointer: coarse)").matches
     ? "drag to move the map, two fingers zoom; touch a chart or the log to jump"
     : "drag to move the map, turn the wheel to zoom; space plays, arrows step; click a chart or the log to jump";

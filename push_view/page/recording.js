@@ -14,7 +14,7 @@ export function lastBefore(times, t) {
 export class Recording {
   constructor(data) {
     const first = data.t[0] ?? 0, since = t => Math.max(0, t - first);
-    this.begin = first; this.name = data.name; this.metadata = data.metadata;
+    this.begin = first; this.name = data.name; this.metadata = data.metadata; this.trouble = data.trouble;
     this.t = data.t.map(since);
     this.duration = this.t.at(-1) ?? 0;
     this.poses = data.poses;

@@ -1,6 +1,7 @@
 """Runs in lockstep are repeated to the bit from their bags, and what differs is found."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from push_model.belief import Interval
 from push_msgs.action import SwarmMove
 from push_msgs.msg import Belief, ControllerStatus
 from push_msgs.srv import Displace, Kill, Reset
-from push_record.bag import BagWriter, read_bag, read_metadata, read_raw
+from push_record.bag import BagWriter, bag_file, read_bag, read_metadata, read_raw
 from push_record.contents import bag_scenario
 from push_record.topics import recorded_topics
 from push_ros.claims import own_domain
@@ -200,6 +201,16 @@ def test_a_changed_parameter_is_named_with_what_it_changes_first(beginning, tmp_
     (line,) = [t for t in told.splitlines() if t.startswith("first difference")]
     assert "/push_plan" in line and "trajectory" in line
     assert read_metadata(tmp_path / "again")["pace"] == "lockstep"
+
+
+def test_a_bag_that_is_cut_off_is_compared_as_far_as_it_goes(beginning, tmp_path, capsys):
+    shutil.copytree(beginning, tmp_path / "cut")
+    file = bag_file(tmp_path / "cut")
+    file.write_bytes(file.read_bytes()[: 2 * file.stat().st_size // 3])
+    assert main(["rerun", str(tmp_path / "cut")]) == 0
+    first, *_ = told = capsys.readouterr().out.splitlines()
+    assert first.startswith("the file is cut off at ") and "only what can be read" in first
+    assert any("equal to the bit" in line for line in told)
 
 
 def test_another_revision_is_told_before_anything_runs(beginning, tmp_path, capsys, monkeypatch):
