@@ -9,12 +9,15 @@ from pathlib import Path
 from planar_push.arguments import add_namespace, add_port, positive
 from push_bringup.systems import check_namespace
 
+_HOST, _PORT = "127.0.0.1", 8080
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this verb."""
     parser.add_argument("bags", nargs="+", metavar="BAG", help="several are shown side by side")
-    parser.add_argument("--host", default="127.0.0.1", help="address to serve the page on")
+    parser.add_argument("--host", default=None, help="address to serve the page on")
     add_port(parser)
+    parser.set_defaults(port=None)
     parser.add_argument(
         "--publish",
         action="store_true",
@@ -31,6 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Serve the page until a signal; or 0 when all has been published."""
+    from push_record.bag import ending
     from push_record.contents import bag_scenario
 
     bags = [Path(bag) for bag in arguments.bags]
@@ -38,6 +42,8 @@ def run(arguments: argparse.Namespace) -> int:
     wrong = ""
     if arguments.publish and len(bags) > 1:
         wrong = "--publish plays one bag; without it, several are shown on the page"
+    elif arguments.publish and (arguments.host is not None or arguments.port is not None):
+        wrong = "--host and --port belong to the page; --publish serves none"
     elif not arguments.publish and (arguments.factor is not None or arguments.namespace):
         wrong = "--factor and --namespace belong to --publish; on the page, choose the pace there"
     try:
@@ -48,13 +54,19 @@ def run(arguments: argparse.Namespace) -> int:
     if wrong:
         print(f"error: {wrong}", file=sys.stderr)
         return 2
+    for bag in bags:
+        trouble = ending(bag).text
+        if trouble:
+            print(f"{bag}: {trouble}", flush=True)
     return _publish(bags[0], arguments) if arguments.publish else _serve(bags, arguments)
 
 
 def _serve(bags: list[Path], arguments: argparse.Namespace) -> int:
     from planar_push.arguments import stop_on_signals
+    from push_view.http_answers import page_address
     from push_view.playback_server import PlaybackServer
 
+    host = _HOST if arguments.host is None else arguments.host
     stopped = False
 
     def stop() -> None:
@@ -62,13 +74,9 @@ def _serve(bags: list[Path], arguments: argparse.Namespace) -> int:
         stopped = True
 
     print(f"reading {len(bags)} bag{'s' if len(bags) > 1 else ''}", flush=True)
-    try:
-        server = PlaybackServer(bags, arguments.host, arguments.port)
-    except OSError as error:
-        print(f"error: port {arguments.port}: {error.strerror}; try --port 0", file=sys.stderr)
-        return 2
+    server = PlaybackServer(bags, host, _PORT if arguments.port is None else arguments.port)
     stop_on_signals(stop)
-    print(f"http://{arguments.host}:{server.port}/", flush=True)
+    print(page_address(host, server.port), flush=True)
     try:
         while not stopped:
             time.sleep(0.1)

@@ -1,8 +1,6 @@
 """Show a live view in the browser, where goals can be set by mouse."""
 
 import argparse
-import socket
-import sys
 
 from planar_push.arguments import add_namespace, add_port, add_scenario
 from push_bringup.systems import check_namespace
@@ -22,6 +20,7 @@ def run(arguments: argparse.Namespace) -> int:
     from push_ros.process import run_node
     from push_ros.scheduling import Urgency
     from push_scenario.scenario import load_scenario
+    from push_view.http_answers import page_address
     from push_view.page_server import PageServer
     from push_view.viewer_node import ViewerNode
 
@@ -34,17 +33,12 @@ def run(arguments: argparse.Namespace) -> int:
         nonlocal server
         node = ViewerNode(scenario)
         server = PageServer(node, arguments.host, arguments.port, starter=starter)
-        everywhere = arguments.host in ("0.0.0.0", "::")
-        host = socket.gethostname() if everywhere else arguments.host
-        print(f"http://{host}:{server.port}/", flush=True)
+        print(page_address(arguments.host, server.port), flush=True)
         return node
 
     words = ["--ros-args", "-r", f"__ns:=/{arguments.namespace.strip('/')}"]
     try:
         return int(run_node(make, words if arguments.namespace else [], urgency=Urgency.BACKGROUND))
-    except OSError as error:
-        print(f"error: port {arguments.port}: {error.strerror}; try --port 0", file=sys.stderr)
-        return 2
     finally:
         if server is not None:
             server.close()

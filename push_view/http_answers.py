@@ -1,5 +1,6 @@
 """What the servers of the page share: its files, answers, and a server in a thread."""
 
+import errno
 import json
 import mimetypes
 import socket
@@ -8,6 +9,9 @@ from collections.abc import Callable, Mapping
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
+
+from push_model.settings import SettingsError
+from push_view.who_may_ask import EVERYWHERE
 
 PATIENCE = 5.0
 """[s] until a page that does not read, or a silent connection, is dropped."""
@@ -70,12 +74,27 @@ class _Server(ThreadingHTTPServer):
         """A broken connection is not reported."""
 
 
+def page_address(host: str, port: int) -> str:
+    """The address of a page to open; that of a server for all addresses names the computer."""
+    shown = socket.gethostname() if host in EVERYWHERE else host
+    return f"http://[{shown}]:{port}/" if ":" in shown else f"http://{shown}:{port}/"
+
+
+def _unbound(host: str, port: int, error: OSError | UnicodeError) -> str:
+    why = (error.strerror if isinstance(error, OSError) else None) or str(error)
+    numbers = (errno.EADDRNOTAVAIL, errno.EAFNOSUPPORT)
+    foreign = isinstance(error, OSError) and error.errno in numbers
+    if foreign or isinstance(error, socket.gaierror | UnicodeError):
+        return f"--host {host}: {why}; give an address of this computer, or 0.0.0.0 for all"
+    return f"port {port}: {why}; try --port 0"
+
+
 class BackgroundServer:
     """Answers requests in threads of its own. port: the one that is bound.
 
     Raises
     ------
-    OSError: host and port cannot be bound.
+    SettingsError: host and port cannot be bound; says which option is wrong.
     """
 
     def __init__(
@@ -83,7 +102,10 @@ class BackgroundServer:
     ) -> None:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         server = type("_BoundServer", (_Server,), {"address_family": family})
-        self._server: ThreadingHTTPServer = server((host, port), handler)
+        try:
+            self._server: ThreadingHTTPServer = server((host, port), handler)
+        except (OSError, UnicodeError) as error:
+            raise SettingsError(_unbound(host, port, error)) from None
         self.port = int(self._server.server_address[1])
         self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
         self._thread.start()

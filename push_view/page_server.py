@@ -138,7 +138,7 @@ class PageServer:
 
     Raises
     ------
-    OSError: host and port cannot be bound.
+    SettingsError: host and port cannot be bound.
     """
 
     def __init__(

@@ -55,7 +55,7 @@ class PlaybackServer:
     Raises
     ------
     ValueError: a bag holds no scenario. FileNotFoundError: there is none.
-    OSError: host and port cannot be bound.
+    SettingsError: host and port cannot be bound.
     """
 
     def __init__(self, bags: Sequence[Path], host: str, port: int) -> None:

@@ -23,6 +23,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from email.message import Message
 
+EVERYWHERE = ("", "0.0.0.0", "::")
+"""Hosts that stand for all addresses of this machine."""
+
 _LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
 
 
@@ -56,7 +59,7 @@ class WhoMayAsk:
     @property
     def everywhere(self) -> bool:
         """Whether it is bound to all addresses."""
-        return self.bound in ("", "0.0.0.0", "::")
+        return self.bound in EVERYWHERE
 
     def knows(self, host: str) -> bool:
         """Whether a Host header names an address under which the server is reached."""

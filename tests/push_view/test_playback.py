@@ -1,6 +1,7 @@
 """Bags on the page: what is sent, and what a browser shows of it."""
 
 import json
+import socket
 import time
 
 import numpy as np
@@ -8,6 +9,8 @@ import pytest
 
 from planar_push.main import main
 from push_msgs.msg import GroupPlan, JobState, Report
+from push_record.bag import bag_file
+from push_view.http_answers import page_address
 from push_view.playback import _one, playback_json
 from push_view.playback_server import PlaybackServer
 from tests.push_view.browser import CHROMIUM, Browser
@@ -107,9 +110,52 @@ def test_wrong_arguments_are_told(scenario, tmp_path, capsys):
     for words, expected in (
         (["play", bag, bag, "--publish"], "--publish plays one bag"),
         (["play", bag, "--factor", "2"], "--factor and --namespace belong to --publish"),
+        (["play", bag, "--publish", "--port", "9"], "--host and --port belong to the page"),
+        (["play", bag, "--publish", "--host", "1.2.3.4"], "--host and --port belong to the page"),
+        (["play", bag, "--host", "no.such.host.invalid"], "--host no.such.host.invalid: "),
+        (["play", bag, "--host", "192.0.2.1", "--port", "0"], "--host 192.0.2.1: "),
+        (["play", bag, "--host", "a..b"], "--host a..b: "),
     ):
         assert main(words) == 2
-        assert expected in capsys.readouterr().err
+        told = capsys.readouterr().err
+        assert expected in told and "port 8080" not in told
+
+
+def test_a_port_that_is_taken_is_told(scenario, tmp_path, capsys):
+    bag = str(written(scenario, tmp_path / "a"))
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        assert main(["play", bag, "--port", str(port)]) == 2
+        assert main(["view", "--port", str(port)]) == 2
+    told = capsys.readouterr().err
+    assert told.count(f"port {port}: ") == 2 and told.count("try --port 0") == 2
+
+
+def test_view_names_a_host_that_is_none(capsys, domain):
+    assert main(["view", "--host", "no.such.host.invalid"]) == 2
+    told = capsys.readouterr().err
+    assert "--host no.such.host.invalid: " in told and "port 8080" not in told
+
+
+def test_addresses_can_be_opened():
+    assert page_address("127.0.0.1", 8080) == "http://127.0.0.1:8080/"
+    assert page_address("::1", 8080) == "http://[::1]:8080/"
+    for everywhere in ("0.0.0.0", "::", ""):
+        assert page_address(everywhere, 80) == f"http://{socket.gethostname()}:80/"
+
+
+def test_play_says_where_a_bag_is_cut_off(scenario, tmp_path, capsys, monkeypatch):
+    bag = written(scenario, tmp_path / "bag")
+    assert playback_json(bag)["trouble"] == ""
+    file = bag_file(bag)
+    file.write_bytes(file.read_bytes()[:-2000])
+    assert playback_json(bag)["trouble"] == "cut off"
+    monkeypatch.setattr("planar_push.arguments.stop_on_signals", lambda stop: stop())
+    assert main(["play", str(bag), "--port", "0"]) == 0
+    told = capsys.readouterr().out
+    assert f"{bag}: the file is cut off at 15.00 s" in told and "http://127.0.0.1:" in told
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")
