@@ -1,20 +1,26 @@
 """What the servers of the page share: its files, answers, and a server in a thread."""
 
 import errno
+import io
 import json
 import mimetypes
 import socket
 import threading
+import time
 from collections.abc import Callable, Mapping
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from push_model.settings import SettingsError
 from push_view.who_may_ask import EVERYWHERE
 
 PATIENCE = 5.0
-"""[s] until a page that does not read, or a silent connection, is dropped."""
+"""[s] until a page that does not read, a silent connection, or one whose request is not whole, is
+dropped."""
+
+CONNECTIONS = 128
+"""Connections that are served at a time. A page needs a few while it loads."""
 
 SAFETY = {
     "Cache-Control": "no-store",
@@ -39,11 +45,55 @@ def page_files() -> dict[str, tuple[str, bytes]]:
     return files
 
 
+class _Incoming(io.RawIOBase):
+    """What comes in on a connection; raises TimeoutError if one request takes longer than it may.
+
+    limit: [s] until its first byte, and from then on until it is whole.
+    """
+
+    def __init__(self, connection: socket.socket, limit: float) -> None:
+        self._connection, self._limit = connection, limit
+        self._end: float | None = None
+
+    def begin(self) -> None:
+        """Wait for the next request."""
+        self._end = None
+
+    def readable(self) -> bool:
+        """See ``io.RawIOBase``."""
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        """See ``io.RawIOBase``."""
+        left = self._limit if self._end is None else self._end - time.monotonic()
+        if left <= 0.0:
+            raise TimeoutError("the request is not whole")
+        self._connection.settimeout(left)
+        try:
+            return self._connection.recv_into(buffer)
+        finally:
+            self._connection.settimeout(self._limit)
+            if self._end is None:
+                self._end = time.monotonic() + self._limit
+
+
 class Answers(BaseHTTPRequestHandler):
-    """A request handler with answers; a connection that is silent is dropped."""
+    """A request handler with answers; a connection that is silent or too slow is dropped."""
 
     protocol_version = "HTTP/1.1"
-    timeout = PATIENCE
+    timeout: ClassVar[float] = PATIENCE
+
+    def setup(self) -> None:
+        """See ``StreamRequestHandler``."""
+        super().setup()
+        self.rfile.close()
+        self._incoming = _Incoming(self.connection, self.timeout)
+        self.rfile = io.BufferedReader(self._incoming)
+
+    def handle_one_request(self) -> None:
+        """See ``BaseHTTPRequestHandler``."""
+        self._incoming.begin()
+        super().handle_one_request()
 
     def log_message(self, *_: Any) -> None:
         """Do not log each request."""
@@ -69,6 +119,29 @@ class Answers(BaseHTTPRequestHandler):
 
 class _Server(ThreadingHTTPServer):
     daemon_threads = True
+    request_queue_size = 64
+
+    def __init__(self, *arguments: Any) -> None:
+        self._free = threading.BoundedSemaphore(CONNECTIONS)
+        super().__init__(*arguments)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Serve a connection in a thread; drop it if there are too many."""
+        if not self._free.acquire(blocking=False):
+            self.shutdown_request(request)
+            return
+        try:
+            super().process_request(request, client_address)
+        except RuntimeError:  # no thread could be started
+            self._free.release()
+            raise
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        """See ``ThreadingMixIn``."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._free.release()
 
     def handle_error(self, *_: Any) -> None:
         """A broken connection is not reported."""

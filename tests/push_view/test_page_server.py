@@ -1,12 +1,16 @@
 """Who is answered, and how many at a time."""
 
+import contextlib
 import http.client
 import json
 import socket
+import threading
+import time
 
 import numpy as np
 import pytest
 
+from push_view.http_answers import CONNECTIONS
 from push_view.who_may_ask import WhoMayAsk, host_name
 from tests.push_view.page_client import Page, Suite
 
@@ -208,3 +212,56 @@ def test_an_idle_connection_is_not_kept_for_ever(page, monkeypatch):
             return connection.recv(1)
 
     assert page.away(silent) == b""
+
+
+def test_clients_that_dribble_keep_no_thread(page, monkeypatch):
+    """More connections than are served, each of which sends a byte now and then and never a whole
+    request: neither in its head nor in its body."""
+    monkeypatch.setattr("push_view.page_server._Handler.timeout", 1.0)
+    before = threading.active_count()
+    host = f"Host: 127.0.0.1:{page.server.port}\r\nContent-Type: application/json"
+    body = f"POST /goal HTTP/1.1\r\n{host}\r\nContent-Length: 9000\r\n\r\n{{"
+    address = "127.0.0.1", page.server.port
+    clients = [socket.create_connection(address, timeout=5) for _ in range(CONNECTIONS + 20)]
+    stop, counts = threading.Event(), []
+
+    def dribble():
+        for k, client in enumerate(clients):
+            with contextlib.suppress(OSError):
+                client.sendall(body.encode() if k % 2 else b"GET / HT")
+        while not stop.wait(0.2):
+            counts.append(threading.active_count())
+            for client in clients:
+                with contextlib.suppress(OSError):
+                    client.send(b"x")
+
+    sender = threading.Thread(target=dribble)
+    sender.start()
+    try:
+        page.until(lambda: False, 3.0)
+        assert page.ask("GET", "/suite")[0] == 200
+        assert max(counts) <= before + 1 + CONNECTIONS
+        assert page.until(lambda: threading.active_count() <= before + 2)
+    finally:
+        stop.set()
+        sender.join()
+        for client in clients:
+            client.close()
+
+
+def test_a_connection_that_is_used_slowly_goes_on(page, monkeypatch):
+    """Each request has its own time, which begins with its first byte."""
+    monkeypatch.setattr("push_view.page_server._Handler.timeout", 1.0)
+
+    def ask_slowly():
+        connection = http.client.HTTPConnection("127.0.0.1", page.server.port, timeout=5)
+        found = []
+        for _ in range(4):
+            time.sleep(0.6)
+            connection.request("GET", "/suite")
+            found.append(connection.getresponse())
+            found[-1].read()
+        connection.close()
+        return [answer.status for answer in found]
+
+    assert page.away(ask_slowly) == [200] * 4
