@@ -81,7 +81,7 @@ class GroupJob:
         self.settings = s = settings or GroupJobSettings()
         self._item, self._robot, self._count = item, robot, count
         self._believed: ContactBelief | None = None
-        self._asked_for = self._item, self._believed  # when the request was made
+        self._asked_for: tuple[ObjectSpec, ContactBelief | None] = item, None
         self._push_settings = push or GroupPushSettings()
         self._control, self._moves = control or GroupControlSettings(), moves or MoveSettings()
         self._outline = ContactOutline(item.geometry)
@@ -346,7 +346,7 @@ class GroupJob:
             self.end(JobError.OFF_TARGET, text)
             return
         self._enter(JobPhase.PLANNING, "planning the next step")
-        self._asked_for = self._item, self._believed
+        self._asked_for = self._item, self._believed  # when the request was made
         self.request = Request(
             pose.copy(), task.goal, robots.copy(), self.dead, task.along, tally.fewest
         )
