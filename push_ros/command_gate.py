@@ -118,7 +118,8 @@ class CommandGate:
     def admit_torques(
         self, name: str, torques: Array, stamp: float, now: float, wall: float
     ) -> Admitted:
-        """Check the torques ``(2,)`` [Nm] of one robot's wheels, left and right."""
+        """Check the torques ``(2,)`` [Nm] of one robot's wheels, left and right. They may answer an
+        older frame than the last command: a controller brakes so when it refuses a frame."""
         rows, refused = self._known([name], stamp, now)
         values = np.asarray(torques, dtype=np.float64).reshape(1, 2)
         if not rows.size:
@@ -130,8 +131,7 @@ class CommandGate:
         good &= numbers
         absurd = good & (np.abs(values) > self.limits.torque[rows][:, None]).any(axis=1)
         refused += _complain("absurd", [name], absurd, values)
-        good = self._in_order([name], rows, values, good & ~absurd, stamp, refused)
-        return self._take(rows, values, good, stamp, wall, refused)
+        return self._take(rows, values, good & ~absurd, stamp, wall, refused)
 
     def silent(self, now: float, wall: float) -> Rows:
         """``(k,)`` rows of robots that drive without a fresh command; they count as stopped."""

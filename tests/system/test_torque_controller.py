@@ -229,11 +229,14 @@ def test_refused_frames_at_full_speed_lock_no_wheel(run, monkeypatch):
     follower, sent = run.node.follower, []
     send = follower.send
     monkeypatch.setattr(follower, "send", lambda *told: (sent.append(told[0]), send(*told)))
-    for _ in range(5):
-        run.node.poses.take(poses_to_ros(run.bridge.world.poses(), run.node.poses.stamp))
+    before = dict(run.bridge._diagnostics.refused)
+    for back in (0.0, 0.0, 0.1, 0.1, 0.1):
+        stamp = run.node.poses.stamp - back
+        run.node.poses.take(poses_to_ros(run.bridge.world.poses(), stamp))
     assert all(torques is not None and max(torques) < 0.0 for torques in sent), sent
     assert run.spinner.until(answer.done, 120.0)
     assert answer.result().result.error_code == CODES.NONE
+    assert dict(run.bridge._diagnostics.refused) == before, "the bridge takes the commands"
 
 
 def compare(tmp_path, case, seeds, **changes):
