@@ -327,7 +327,7 @@ class GroupPush:
         assert self._begin is not None
         dead = self._obedience.step(now, robots, twists)
         if dead and len(dead) == len(robots):
-            return "no robot moves although commanded to: they are stuck, or poses are frozen", ()
+            return "no robot moves as commanded: the robots may be stuck, or the poses frozen", ()
         if dead:
             return f"{_count(dead)} not move although commanded to", dead
         away, turned = self._errors(pose)

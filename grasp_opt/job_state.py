@@ -15,14 +15,14 @@ from push_estimation.actuation_monitor import ActuationMonitor
 from push_model import se2
 from push_model.arrays import Array
 
-NOBODY = "no robot moves although commanded to: they are switched off, or poses are frozen"
+NOBODY = "no robot moves as commanded: the robots may be switched off, or the poses frozen"
 """Why a job ends when all robots stand."""
 
 
 def without(dead: tuple[int, ...], count: int, message: str) -> str:
     """What is told of a failure when so many of ``count`` robots do not move."""
     those = f"{len(dead)} of {count} robots do not move although commanded to"
-    return f"{those} (switched off, or poses are frozen); without them: {message}"
+    return f"{those} (they may be switched off, or the poses frozen); without them: {message}"
 
 
 @dataclass

@@ -53,8 +53,8 @@ class Guard:
             return ""
         self.leave()
         return (
-            f"no answer to the stop command from {', '.join(moving)}; the guard, a process in "
-            f"the background, tries for {_LIMIT:g} s to stop it; if it still moves, switch it off"
+            f"{', '.join(moving)} did not answer the stop command; the guard, a process in the "
+            f"background, tries for {_LIMIT:g} s to stop them; switch off those that still move"
         )
 
     def leave(self) -> None:

@@ -23,8 +23,8 @@ class LabBridgeSettings:
         0.2,
         low=0.01,
         high=5.0,
-        doc="Time after the frame of poses that its last command answers, after which a robot is "
-        "stopped (s).",
+        doc="A robot is stopped when the frame of poses that its last command answers is older "
+        "than this (s).",
     )
     pose_timeout: float = bounded(
         0.25,

@@ -98,7 +98,9 @@ def time_to_wait(arguments: argparse.Namespace, default: float) -> float:
     if not arguments.no_wait:
         return float(default if arguments.timeout is None else arguments.timeout)
     if arguments.timeout is not None:
-        raise SettingsError("--timeout: with --no-wait, the job is not followed; leave one out")
+        raise SettingsError(
+            "--timeout: with --no-wait, the job is not followed; give only one of the two options"
+        )
     return 0.0
 
 

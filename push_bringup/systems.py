@@ -327,7 +327,7 @@ def nodes_of(system: str, scenario: Scenario, namespace: str = "") -> tuple[Node
     if system != "rearrange" and scenario.arrangement:
         raise SettingsError(
             f"scenario '{scenario.name}' has an arrangement, which only the system 'rearrange' "
-            f"makes; give '{system}' a scenario without one"
+            f"can carry out; give '{system}' a scenario without one"
         )
     return found.nodes(scenario, namespace)
 

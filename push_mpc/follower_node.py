@@ -182,7 +182,9 @@ class FollowerNode(Node):
         tolerances = (request.position_tolerance, request.orientation_tolerance)
         finite(tolerances, "a tolerance")
         if min(tolerances) < 0.0:
-            raise InvalidMessage("a tolerance must not be negative; 0 takes the node's parameter")
+            raise InvalidMessage(
+                "a tolerance must not be negative; 0 means that the node's parameter is used"
+            )
         return self.follower.parse(request)
 
     def _begin(self, request: Any) -> None:

@@ -101,8 +101,8 @@ class TorqueFollower:
             raise InvalidMessage("only a push can go on where another one is")
         if request.obstacles:
             raise InvalidMessage(
-                "the torque controller keeps off no obstacles; leave 'obstacles' empty, and send a "
-                "trajectory that leads past them"
+                "the torque controller does not avoid obstacles; leave 'obstacles' empty, and send "
+                "a trajectory that is clear of them"
             )
         if request.object:
             raise InvalidMessage(

@@ -221,7 +221,7 @@ def ending(bag: Path) -> Ending:
     if records.trouble == "cut off":
         text = f"the file is cut off {where}, for example because the recorder was killed"
     elif records.somewhere:
-        text = "a part of the file is damaged or missing: its checksum is wrong"
+        text = "a part of the file is damaged or missing: the checksum of the whole file is wrong"
     elif records.trouble:
         text = f"the file is damaged {where}; what follows is not read"
     return Ending(time, records.trouble, text)

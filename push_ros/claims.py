@@ -18,7 +18,10 @@ _MINE = "PLANAR_PUSH_DOMAIN"  # environment: the domain that this process or its
 _RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 DOMAINS = 1, 100
 """First and last domain of runs in lockstep."""
-OCCUPIED = "a suite, a calibration or a drive test runs in this domain; stop it before you drive"
+OCCUPIED = (
+    "a suite, `calibrate` or `doctor --drive` already runs in this ROS domain and namespace on "
+    "this machine; stop it first"
+)
 _claims: dict[int, IO[str]] = {}
 _turns = itertools.count()
 

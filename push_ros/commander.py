@@ -60,5 +60,5 @@ class TeamCommander:
             return command
         self.not_finite += 1
         if self.not_finite <= _SAID:
-            self._log(f"the method's command to '{name}' is not finite: {command}; it stands")
+            self._log(f"the method's command to '{name}' is not finite: {command}; it is stopped")
         return _STAND

@@ -171,7 +171,8 @@ def _check(options: StudyOptions) -> None:
         world_kind(options.world)
     if options.scheduler and options.workers:
         raise SettingsError(
-            "workers: these are local processes, and with --scheduler there are none; leave one out"
+            "workers: local processes are not used with --scheduler; "
+            "give only one of the two options"
         )
     if options.scheduler:
         check_cluster()

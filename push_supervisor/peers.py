@@ -140,7 +140,7 @@ class Peers:
                 failed(JobError.PLANNING_FAILED, f"the plan is not valid: {problem}")
                 return
             if not segments:
-                failed(JobError.PLANNING_FAILED, "the planner answered with a plan of no pushes")
+                failed(JobError.PLANNING_FAILED, "the planner answered with a plan without pushes")
                 return
             self._answered(number, events.PlanFound(segments, improving))
 

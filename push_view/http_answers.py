@@ -158,7 +158,9 @@ def _unbound(host: str, port: int, error: OSError | UnicodeError) -> str:
     numbers = (errno.EADDRNOTAVAIL, errno.EAFNOSUPPORT)
     foreign = isinstance(error, OSError) and error.errno in numbers
     if foreign or isinstance(error, socket.gaierror | UnicodeError):
-        return f"--host {host}: {why}; give an address of this computer, or 0.0.0.0 for all"
+        return (
+            f"--host {host}: {why}; give an address of this computer, or 0.0.0.0 for all addresses"
+        )
     return f"port {port}: {why}; try --port 0"
 
 

@@ -101,7 +101,9 @@ def _text(values: Mapping[str, Any], name: str, default: str | None = None) -> s
     try:
         value.encode()  # JSON may hold halves of characters; messages and answers may not
     except UnicodeEncodeError:
-        raise ValueError(f"{name}: expected text of whole characters, got {value!r}") from None
+        raise ValueError(
+            f"{name}: expected text that can be encoded as UTF-8, got {value!r}"
+        ) from None
     return value
 
 

@@ -83,8 +83,8 @@ class BridgeSettings:
         0.2,
         low=0.01,
         high=5.0,
-        doc="Simulated time after the frame of poses that its last command answers, after which a "
-        "robot is stopped (s). The greatest latency of the poses is added.",
+        doc="A robot is stopped when the frame of poses that its last command answers is older "
+        "than this, plus the greatest latency of the poses (s of simulated time).",
     )
     command_timeout_wall: float = bounded(
         0.5,

@@ -42,7 +42,7 @@ def test_no_robot_is_driven_beside_a_suite(line, domain, capsys):
         assert main([*line, "--scenario", LAB]) == 2
     finally:
         claim.close()
-    assert "a suite is running" in capsys.readouterr().err
+    assert "`calibrate` or `doctor --drive` already runs" in capsys.readouterr().err
 
 
 def test_a_calibration_is_told_to_the_nodes(ros, domain, tmp_path, monkeypatch, capsys):

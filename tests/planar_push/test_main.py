@@ -89,7 +89,7 @@ def test_help_says_what_each_benchmark_and_each_study_is_for(capsys):
         (["goal", "0", "0", "0", "--no-wait", "--timeout", "5"], "--timeout: with --no-wait"),
         (["rearrange", "--no-wait", "--timeout", "5"], "--timeout: with --no-wait"),
         (["leaderboard", "--workers", "2", "--scheduler", "tcp://a:1", "--out", "OUT"], "workers:"),
-        (["launch", "single", "--scenario", "rearrange"], "only the system 'rearrange' makes"),
+        (["launch", "single", "--scenario", "rearrange"], "the system 'rearrange' can carry out"),
         (["launch", "group", "--scenario", "rearrange"], "'rearrange' has an arrangement"),
         (["report", "NOWHERE"], "NOWHERE"),
         (["play", "NOWHERE"], "NOWHERE: no such bag"),

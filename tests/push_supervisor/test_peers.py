@@ -44,5 +44,5 @@ def test_a_plan_without_pushes_is_no_plan(ros, improving):
     assert spinner.until(lambda: bool(answers), 15.0)
     number, event = answers[0]
     assert number == 7 and isinstance(event, PlanFailed)
-    assert event.code is JobError.PLANNING_FAILED and "no pushes" in event.message
+    assert event.code is JobError.PLANNING_FAILED and "without pushes" in event.message
     spinner.close()
