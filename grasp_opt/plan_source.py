@@ -3,6 +3,7 @@
 import time
 from typing import Protocol
 
+from grasp_opt.contact_outline import convex
 from grasp_opt.job_state import Request
 from grasp_opt.placement import PlacementSettings
 from grasp_opt.sequencing import NoStep
@@ -70,7 +71,7 @@ class InlinePlans:
     def ask(self, request: Request, seen: Seen, belief: Belief) -> None:
         """See PlanSource."""
         item, robot = self._names
-        specs = belief.object(item), belief.robot(robot), ContactBelief.of(belief, item)
+        specs = convex(belief.object(item)), belief.robot(robot), ContactBelief.of(belief, item)
         if specs != self._specs:
             self._specs, self._planner = specs, None
         self._asked = request, seen

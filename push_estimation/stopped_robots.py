@@ -22,7 +22,7 @@ from push_model.settings import bounded, settings
 _BESIDE = 0.1  # cosine of the angle to the way that was commanded up to which a body is beside it
 _OUTWARD = 0.3  # cosine of the angle to the outward normal of a way on which the object may stop it
 _LONGEST = 0.2  # [s] between frames of one window
-_FORCE = 0.2  # [s] of pose time for which a command is in force, as at the bridges
+_FORCE = 0.2  # [s] of pose time for which a command is in force, the default of the bridges
 
 
 @settings
@@ -124,6 +124,8 @@ class StoppedRobots:
     def command(self, name: str, stamp: float, vx: float, vy: float, world: bool) -> None:
         """A velocity [m/s], in the robot's own frame or that of the world, that answers the poses
         of a time [s]. It is in force for ``_FORCE`` seconds; then the robot stands."""
+        if name in self._commands and stamp < self._commands[name][0] and (vx or vy):
+            return  # the bridges refuse it
         self._commands[name] = (stamp, vx, vy, world)
 
     def reset(self) -> None:

@@ -88,7 +88,11 @@ class Follower(Protocol):
         ...
 
     def rest(self, dt: float, frame: Frame) -> Command:
-        """Answer a frame that is refused, or in which no task is worked on; a task is kept."""
+        """Answer a frame in which no task is worked on; one that there is is kept."""
+        ...
+
+    def refused(self) -> Command:
+        """Answer a frame that is refused: what it shows, and its time, count for nothing."""
         ...
 
     def halt(self) -> None:
@@ -227,7 +231,7 @@ class FollowerNode(Node):
     def _on_frame(self, frame: Frame) -> None:
         self.stamp = frame.stamp
         if frame.verdict is Stamp.REFUSED:
-            self.send(self.follower.rest(_TICK, frame))
+            self.send(self.follower.refused())
             return
         if frame.verdict is Stamp.RESET:
             self._heartbeat.reset()

@@ -214,6 +214,11 @@ class VelocityFollower:
         self.tracker.rest(dt)
         return None
 
+    def refused(self) -> Command:
+        """See Follower."""
+        self.tracker.rest(0.0)
+        return None
+
     def halt(self) -> None:
         """See Follower."""
         self.tracker.halt()

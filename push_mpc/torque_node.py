@@ -144,6 +144,10 @@ class TorqueFollower:
         """See Follower: it brakes, and stands once it is at rest."""
         return self.tracker.rest(dt, self._pose(frame))
 
+    def refused(self) -> Command:
+        """See Follower."""
+        return self.tracker.brake()
+
     def halt(self) -> None:
         """See Follower: the estimate begins anew after a gap in the poses by itself."""
 

@@ -140,7 +140,7 @@ class TorqueTracker:
         Returns torques that bring the robot to rest; None once it may be told to stand.
         """
         self._see(dt, pose, None)
-        return self._brake()
+        return self.brake()
 
     def reference(self) -> Array:
         """``(N + 1, 5)`` of the horizon from now: its pose, v, omega."""
@@ -188,7 +188,7 @@ class TorqueTracker:
         self._failed += 1
         if self._failed >= s.solver_patience:
             return self._ended(TrackError.SOLVER_FAILED, solve.reason, error, progress, solve)
-        return TorqueTick(self._brake(), False, TrackError.NONE, "", error, progress, solve)
+        return TorqueTick(self.brake(), False, TrackError.NONE, "", error, progress, solve)
 
     def _see(self, dt: float, pose: Array | None, wheels: Array | None) -> None:
         """Carry the estimate to the time of a frame, and take in what it shows."""
@@ -224,7 +224,7 @@ class TorqueTracker:
             late -= part
         return due
 
-    def _brake(self) -> Torques | None:
+    def brake(self) -> Torques | None:
         """Torques towards rest; None, for ever, once the robot is there or nothing is known."""
         nmpc, observer = self.controller, self.observer
         v, omega = map(float, observer.ahead(self._sent)[3:])
@@ -251,7 +251,7 @@ class TorqueTracker:
         solve: NmpcResult | None = None,
     ) -> TorqueTick:
         self.stop()
-        return TorqueTick(self._brake(), True, code, message, error, progress, solve)
+        return TorqueTick(self.brake(), True, code, message, error, progress, solve)
 
 
 def _away(off: float) -> str:

@@ -27,7 +27,8 @@ class Mover:
         self._ended = ended
         self._client = GoalClient(node, MoveObject, names.team("move_object"))
         self._asked: tuple[str, Array] | None = None
-        self._begun = False  # whether the supervisor was seen to work on it, or was gone
+        self._begun = False  # whether the supervisor was seen to work on it
+        self._gone = False  # whether it left the graph meanwhile
         node.create_subscription(JobState, names.team("job_state"), self._on_job, LATCHED)
 
     @property
@@ -37,7 +38,7 @@ class Mover:
 
     def move(self, item: str, goal: Array, stamp: float) -> None:
         """Ask for an object at a goal ``(3,)``. stamp: [s] of the poses."""
-        self._asked, self._begun = (item, goal), False
+        self._asked, self._begun, self._gone = (item, goal), False, False
         request = MoveObject.Goal(object=item, goal=pose_stamped_to_ros(goal, stamp))
         self._client.send(request, self._on_result)
 
@@ -48,7 +49,7 @@ class Mover:
 
     def missed(self) -> None:
         """The supervisor is gone: if it comes back without a job, it has forgotten this one."""
-        self._begun = True
+        self._gone = True
 
     def _end(self, code: JobError, why: str) -> None:
         if self._asked is not None:
@@ -66,7 +67,7 @@ class Mover:
         forgotten all jobs."""
         if self._asked is None:
             return
-        if not state.goal.header.frame_id and self._begun:
+        if not state.goal.header.frame_id and (self._begun or self._gone):
             why = "the supervisor was restarted and does not continue the move"
             self._end(JobError.JOB_FORGOTTEN, why)
             return

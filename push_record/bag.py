@@ -3,7 +3,6 @@ little, readable by rosbag2, Foxglove, the ``rosbags`` and the ``mcap`` librarie
 
 import contextlib
 import math
-import struct
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -11,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from mcap.exceptions import McapError, RecordLengthLimitExceeded
+from mcap.exceptions import RecordLengthLimitExceeded
 from mcap.records import Channel, DataEnd, Message, Metadata, Schema
 from mcap.stream_reader import CRCValidationError, StreamReader
 from mcap.writer import CompressionType, Writer
@@ -24,10 +23,6 @@ from push_record.older_messages import OlderMessages
 _CHUNK = 64 * 1024  # [bytes]
 _FLUSH_EVERY = 1.0  # [s] wall time
 _MAGIC = b"\x89MCAP0\r\n"  # at both ends of a finished file
-_BROKEN = (
-    *(McapError, EOFError, ValueError, struct.error, KeyError),
-    *(OverflowError, MemoryError),  # a length that is damaged
-)
 _MAXIMUM = {"sec": 9223372036, "nsec": 854775807}
 
 
@@ -248,7 +243,9 @@ class _Records:
             reader = StreamReader(file, validate_crcs=True, record_size_limit=size)
             try:
                 yield from _known(reader.records)
-            except _BROKEN as error:
+            except OSError:
+                raise
+            except Exception as error:  # of the format, or of what decompresses it
                 long = isinstance(error, RecordLengthLimitExceeded)
                 cut = not finished and (long or not file.read(1))
                 self.trouble = "cut off" if cut else "damaged"

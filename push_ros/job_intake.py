@@ -152,11 +152,10 @@ class JobIntake:
 
     # A job that outlives its node
 
-    def begin(self, task: Task) -> None:
+    def begin(self) -> None:
         """A task begins that did not come as a goal: a job of its own, with an empty goal."""
         self._goal, self._state.goal = None, PoseStamped()
         self._state.job += 1
-        self.keep(task)
 
     def keep(self, task: Task) -> None:
         """Keep what the owner has made of the job that begins."""
@@ -347,7 +346,9 @@ class JobIntake:
     def _on_execute(self, request: Any, response: Any) -> Any:
         response.success = self._owner.plan_ready
         response.message = "executing" if response.success else "there is no plan to execute"
-        self._plan_only = self._plan_only and not response.success
+        if response.success:
+            self._plan_only = False
+            self._keeper.executed()
         self._owner.execute()
         return response
 

@@ -78,6 +78,11 @@ class JobKeeper:
         )
         self._keep(self._current, 0)
 
+    def executed(self) -> None:
+        """The plan of the job is carried out: a restarted node does so, too."""
+        if self._current is not None:
+            self._keep(replace(self._current, plan_only=False), 0)
+
     def end(self) -> None:
         """There is no job any more."""
         if self._current is not None or self.pending is not None:

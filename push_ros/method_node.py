@@ -237,7 +237,7 @@ class MethodNode(Node):
 
     def take_task(self, task: Task) -> None:
         """See TaskHost."""
-        self._intake.begin(task)
+        self._intake.begin()
         self._take(task)
 
     def _take(self, task: Task) -> None:
@@ -253,6 +253,8 @@ class MethodNode(Node):
 
     def _begin_early(self, refusal: GoalRefused | None) -> None:
         """A task that came before the map has been judged on the map."""
+        if self._early.task is None:
+            return  # it has ended meanwhile
         if refusal is not None:
             self._early.end(refusal.code, str(refusal))
         elif (task := self._early.forget()) is not None:

@@ -156,7 +156,7 @@ class SupervisorSettings:
         low=0.5,
         high=600.0,
         doc="Wall time without feedback of the planner after which the request is repeated "
-        "(s). There is no limit in lockstep.",
+        "(s). In lockstep: pose time, and only after the planner has left the ROS graph.",
     )
     pose_timeout: float = bounded(
         5.0,

@@ -143,6 +143,12 @@ def test_an_outline_with_a_dent_is_taken_as_its_hull():
     m.step(SEEN, TOLD.updated({}, {"plate": dent}))
     outline = m.job._outline.shape.outline
     assert m.job._outline.shape.convex and len(outline) == len(PLATE.outline)
+    told = TOLD.updated({}, {"plate": dent})
+    for k in range(1, 4):
+        m.step(replace(SEEN, time=1.0 + 0.02 * k), told)
+    assert m.job.plan is not None and m.job.state is JobPhase.POSITIONING, m.job.reason
+    points = m.job._outline.at(m.job.plan.placement.way).points
+    assert np.allclose(points, m.job.plan.placement.contacts.points, atol=1e-9)
 
 
 def test_a_goal_is_judged_with_what_is_believed_now():

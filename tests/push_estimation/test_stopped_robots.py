@@ -187,3 +187,16 @@ def test_a_robot_that_nobody_commands_any_more_stands_by_itself(seed):
             stopped.command("a", t, 0.05, 0.0, False)
         robot = np.array([-R - off, 0.0, 0.0]) + 5e-4 * random.standard_normal(3)
         assert not stopped.frame(t, np.zeros(3), {"a": robot}, NONE, LINE)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_motion_that_answers_an_older_frame_than_the_last_command_does_not_count(seed):
+    """The bridges refuse it."""
+    random = np.random.default_rng(seed)
+    stopped = StoppedRobots(R)
+    for k in range(200):
+        t = k * STEP
+        stopped.command("a", t, 0.0, 0.0, False)
+        stopped.command("a", t - STEP, 0.05, 0.0, False)
+        robot = np.array([-R, 0.0, 0.0]) + 5e-4 * random.standard_normal(3)
+        assert not stopped.frame(t, np.zeros(3), {"a": robot}, NONE, LINE)

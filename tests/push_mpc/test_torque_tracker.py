@@ -180,3 +180,16 @@ def test_a_latency_that_is_known_costs_little(latency):
     exact, made_good, ignored = found
     assert made_good < 1.2 * exact + 1e-3, found
     assert ignored > 1.5 * made_good, found
+
+
+def test_frames_that_are_refused_move_no_estimate():
+    """They come twice, or late: a wheel brakes at each, and no time passes."""
+    tracker = tracker_of()
+    tracker._standing = False
+    for k in range(200):
+        tracker._see(0.01, np.array([0.005 * k, 0.0, 0.0]), None)
+    speed, ahead = tracker.observer.v, tracker.observer.ahead(tracker._sent)[0]
+    told = [tracker.brake() for _ in range(20)]
+    assert speed == pytest.approx(0.5, abs=0.02)
+    assert all(torques is not None and max(torques) < 0.0 for torques in told)
+    assert tracker.observer.v == speed and tracker.observer.ahead(tracker._sent)[0] == ahead

@@ -199,3 +199,33 @@ def test_cancel_for_all_refuses_the_goal_at_the_door_too(client):
     Method.held = False
     client.until(lambda: False, 0.3)
     assert client.state.job == 1 and not client.node.busy
+
+
+def test_a_goal_before_the_map_that_its_client_cancels_while_it_is_judged_stays_canceled(ros):
+    """The judgement ends later, and has nothing left to begin."""
+    scenario = load_scenario("swarm-square")
+    node = MethodNode(replace(SWARM, make=Method), scenario, hosting=HOSTING)
+    with visitor() as (visiting, other):
+        spinner = Spinner([node])
+
+        def until(condition, limit=20.0):
+            return other.until(lambda: bool(spinner.once(0.01) or condition()), limit)
+
+        client = Client(node, visiting, until)
+        try:
+            Method.held = True
+            assert until(lambda: client.states and client.move.server_is_ready())
+            handle = client.send(client.move, MoveObject.Goal(goal=pose(GOAL)))
+            assert until(lambda: client.state.job == 1)
+            client.maps.publish(grid_to_ros(scenario.grid, 0.0))
+            assert until(lambda: node._door.busy)
+            canceled = handle.cancel_goal_async()
+            assert until(canceled.done)
+            assert client.code(handle.get_result_async()) == JobError.CANCELED
+            Method.held = False
+            assert until(lambda: not node._door.busy or bool(node._door.go_on()))
+            until(lambda: False, 0.3)
+            assert client.state.error_code == JobError.CANCELED and client.task is None
+        finally:
+            Method.held = False
+            spinner.close()

@@ -354,3 +354,15 @@ def test_how_a_job_that_was_not_taken_up_ended_is_told_until_the_next_one(ros):
     assert client.state.error_code == JobError.NONE
     client.spinner.close()
     os.close(file)
+
+
+def test_a_restarted_node_carries_out_a_plan_that_was_to_be_executed(planner, monkeypatch):
+    """Else it would plan, and wait for a second ``/execute``."""
+    kept = []
+    monkeypatch.setattr(planner.owner.intake._keeper._memory, "write", kept.append)
+    plan(planner)
+    assert kept[-1].plan_only
+    execute = planner.node.create_client(Trigger, "/red/execute")
+    called = execute.call_async(Trigger.Request())
+    assert planner.spinner.until(called.done, 15.0) and called.result().success
+    assert not kept[-1].plan_only and kept[-1].job == 1
