@@ -23,6 +23,7 @@ from push_scenario.scenario import load_scenario
 from swarm_push.node import HOSTING
 from swarm_push.swarm_method import SWARM
 
+SCENARIO = load_scenario("swarm-square")
 GOAL, OTHER = np.array([0.5, 0.0, 0.0]), np.array([1.0, 0.0, 0.0])
 
 
@@ -86,15 +87,18 @@ class Client:
     def task(self):
         return self.node.method.task
 
-    def ready(self):
+    def reached(self):
         return (
             self.states
             and self.topic.get_subscription_count()
+            and self.maps.get_subscription_count()
             and self.move.server_is_ready()
             and self.targets.server_is_ready()
             and self.cancel.service_is_ready()
-            and self.node.method is not None
         )
+
+    def publish_map(self):
+        self.maps.publish(grid_to_ros(SCENARIO.grid, 0.0))
 
     def publish(self, goal):
         self.topic.publish(pose_stamped_to_ros(goal, 1.0))
@@ -115,9 +119,9 @@ class Client:
 
 
 @pytest.fixture
-def client(ros):
-    scenario = load_scenario("swarm-square")
-    node = MethodNode(replace(SWARM, make=Method), scenario, hosting=HOSTING)
+def unmapped(ros):
+    """There is no map yet."""
+    node = MethodNode(replace(SWARM, make=Method), SCENARIO, hosting=HOSTING)
     with visitor() as (visiting, other):
         spinner = Spinner([node])
 
@@ -125,11 +129,17 @@ def client(ros):
             return other.until(lambda: bool(spinner.once(0.01) or condition()), limit)
 
         client = Client(node, visiting, until)
-        client.maps.publish(grid_to_ros(scenario.grid, 0.0))
-        assert until(client.ready)
+        assert until(client.reached)
         yield client
         Method.held = False
         spinner.close()
+
+
+@pytest.fixture
+def client(unmapped):
+    unmapped.publish_map()
+    assert unmapped.until(lambda: unmapped.node.method is not None)
+    return unmapped
 
 
 def pose(goal):
@@ -201,31 +211,18 @@ def test_cancel_for_all_refuses_the_goal_at_the_door_too(client):
     assert client.state.job == 1 and not client.node.busy
 
 
-def test_a_goal_before_the_map_that_its_client_cancels_while_it_is_judged_stays_canceled(ros):
+def test_a_goal_before_the_map_that_is_canceled_while_it_is_judged_stays_canceled(unmapped):
     """The judgement ends later, and has nothing left to begin."""
-    scenario = load_scenario("swarm-square")
-    node = MethodNode(replace(SWARM, make=Method), scenario, hosting=HOSTING)
-    with visitor() as (visiting, other):
-        spinner = Spinner([node])
-
-        def until(condition, limit=20.0):
-            return other.until(lambda: bool(spinner.once(0.01) or condition()), limit)
-
-        client = Client(node, visiting, until)
-        try:
-            Method.held = True
-            assert until(lambda: client.states and client.move.server_is_ready())
-            handle = client.send(client.move, MoveObject.Goal(goal=pose(GOAL)))
-            assert until(lambda: client.state.job == 1)
-            client.maps.publish(grid_to_ros(scenario.grid, 0.0))
-            assert until(lambda: node._door.busy)
-            canceled = handle.cancel_goal_async()
-            assert until(canceled.done)
-            assert client.code(handle.get_result_async()) == JobError.CANCELED
-            Method.held = False
-            assert until(lambda: not node._door.busy or bool(node._door.go_on()))
-            until(lambda: False, 0.3)
-            assert client.state.error_code == JobError.CANCELED and client.task is None
-        finally:
-            Method.held = False
-            spinner.close()
+    client, node = unmapped, unmapped.node
+    Method.held = True
+    handle = client.send(client.move, MoveObject.Goal(goal=pose(GOAL)))
+    assert client.until(lambda: client.state.job == 1)
+    client.publish_map()
+    assert client.until(lambda: node._door.busy)
+    canceled = handle.cancel_goal_async()
+    assert client.until(canceled.done)
+    assert client.code(handle.get_result_async()) == JobError.CANCELED
+    Method.held = False
+    assert client.until(lambda: not node._door.busy or bool(node._door.go_on()))
+    client.until(lambda: False, 0.3)
+    assert client.state.error_code == JobError.CANCELED and client.task is None
