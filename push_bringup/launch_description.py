@@ -27,11 +27,13 @@ class Argument:
 
 @dataclass(frozen=True)
 class Process:
-    """A node in a process of its own. environment: what is set in addition to the caller's."""
+    """A node in a process of its own. environment: what is set in addition to the caller's.
+    restartable: whether its command can be run again; a recorder's cannot, its folder exists."""
 
     name: str
     command: list[str]
     environment: dict[str, str]
+    restartable: bool
 
 
 def arguments_of(system: str) -> tuple[Argument, ...]:
@@ -45,7 +47,7 @@ def arguments_of(system: str) -> tuple[Argument, ...]:
         Argument("namespace", "", "Namespace of the whole suite"),
         Argument("record", "", "Folder of the bag to record"),
         Argument("factor", "", "Pace of the simulation, simulated over wall time"),
-        Argument("respawn", "false", "Whether a node that dies is started again"),
+        Argument("respawn", "false", "Whether a dead node is started again; not the recorder"),
     )
 
 
@@ -75,7 +77,7 @@ def processes_of(values: Mapping[str, str], folder: Path) -> list[Process]:
     check_domain(setup.namespace)
     environment = prepare_environment({})
     return [
-        Process(child.name, command_of(child.module, child.words), environment)
+        Process(child.name, command_of(child.module, child.words), environment, child.bag is None)
         for child in setup.write(folder)
     ]
 
@@ -111,7 +113,7 @@ def _start(context: Any, system: str) -> list[Any]:
                     k: v for k, v in process.environment.items() if k not in context.environment
                 },
                 output="screen",
-                respawn=respawn,
+                respawn=respawn and process.restartable,
                 respawn_delay=1.0,
                 on_exit=ended,
             )

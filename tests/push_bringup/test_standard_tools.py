@@ -110,6 +110,7 @@ def test_arguments_of_a_launch_file_are_checked_before_anything_starts(tmp_path,
         processes_of({**values, "scenario": "nowhere"}, tmp_path)
     named = processes_of({**values, "namespace": "lab", "record": str(tmp_path / "bag")}, tmp_path)
     assert named[0].name == "recorder" and "__ns:=/lab" in named[1].command
+    assert [p.name for p in named if not p.restartable] == ["recorder"], "its folder exists then"
     claim = claim_world(str(domain), "/")
     with pytest.raises(DomainInUse):
         processes_of(values, tmp_path)
