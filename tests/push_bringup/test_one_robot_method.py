@@ -282,6 +282,7 @@ def moved_goal(seed, supervisor=None, near=math.inf):
     return book, reasons
 
 
+@pytest.mark.long
 def test_a_goal_that_moves_in_mid_push_is_planned_for_while_the_robot_pushes():
     repaired = 0
     for seed in range(4):

@@ -234,6 +234,7 @@ def summary(seeds, **rig):
     return sum(c.floor for c in cases), sum(c.contact for c in cases)
 
 
+@pytest.mark.long
 def test_random_objects_are_calibrated():
     """A slice of the study below."""
     floor, contact = summary(range(4))

@@ -6,6 +6,7 @@ import sys
 from itertools import count
 from pathlib import Path
 
+import pytest
 from numba.core.dispatcher import Dispatcher
 
 from push_model.kernel_cache import PACKAGES, modules_used
@@ -67,6 +68,7 @@ def write(folder, value=0.5, factor=1.0, table=(0.0, 3.0), fields="a b"):
     (package / "constants.py").write_text(constants)
 
 
+@pytest.mark.long
 def test_a_kernel_is_compiled_anew_when_what_it_uses_of_other_files_changes(tmp_path):
     write(tmp_path)
     assert run(tmp_path) == (7.0, False)

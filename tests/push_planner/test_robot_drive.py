@@ -46,6 +46,7 @@ def checked(way, start, goal):
     return way
 
 
+@pytest.mark.long
 def test_random_ways_are_driven_within_all_limits_and_never_slower_than_with_stops():
     random = np.random.default_rng(3)
     faster = 0

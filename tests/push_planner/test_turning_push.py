@@ -65,6 +65,7 @@ def test_robot_and_object_keep_their_distance_and_do_not_overlap(planner):
     assert seen > 80
 
 
+@pytest.mark.long
 def test_the_side_that_is_named_is_flush_at_the_end(planner):
     sides = {side.index: side for side in planner.scene.sides}
     for _, pushes in beside_walls(planner, 20, 2):

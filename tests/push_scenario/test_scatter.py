@@ -30,6 +30,7 @@ def test_nothing_is_nearer_than_the_gap(seed):
     assert np.abs(places).max() < 1.0 - RADIUS - 0.02 + 1e-9
 
 
+@pytest.mark.long
 def test_too_many_robots_are_refused_with_how_many_fit():
     small = FreeSpace(rasterise(EnvironmentSpec((0.7, 0.7), resolution=0.02)))
     with pytest.raises(SettingsError, match=r"there is room for \d+ of 40 robots"):

@@ -95,6 +95,7 @@ def test_every_offset_has_every_variant_and_a_plot(tmp_path, capsys):
     assert "> 50" in out and out.count("1.00 (1.00)") == len(tasks)
 
 
+@pytest.mark.long
 def test_the_half_turn_takes_three_pushes_in_a_low_room():
     """The planner, which may make fewer, makes three; on 1.4 m two and on 3 m one are enough."""
     scenario = load_scenario("three-push")

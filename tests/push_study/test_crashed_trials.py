@@ -8,6 +8,7 @@ import pytest
 from push_study.pool import crashed
 from push_study.study import StudyOptions, experiment, experiment_names, run_study, statistics_of
 from push_study.summary import aggregate
+from tests.samples import mostly_long
 
 NAMES = experiment_names()
 
@@ -27,7 +28,7 @@ def counted(found):
     return sum(flat) if flat else None
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", mostly_long(NAMES, 8))
 def test_a_study_of_which_every_trial_died_is_concluded_all_the_same(name, tmp_path):
     what, options, tasks = tasks_of(name, tmp_path)
     rows = [crashed(task, "died") for task in tasks]

@@ -164,6 +164,7 @@ def test_an_object_at_its_goal_stays_there(arena):
     assert method.errors(HERE) == (0.0, 0.0)
 
 
+@pytest.mark.long
 def test_a_short_match_in_lockstep_reaches_a_goal_ahead():
     system = "push_study.rivals.stable_nmpc:METHOD"
     starts = np.array([HERE.robots["e0"]])

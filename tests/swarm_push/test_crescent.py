@@ -86,7 +86,7 @@ def test_a_crescent_for_nothing_lies_all_round():
     )
 
 
-@pytest.mark.parametrize("name", mostly_long(NAMES, 2))
+@pytest.mark.parametrize("name", mostly_long(NAMES, 1))
 def test_ways_round_an_object_come_to_their_ends_without_touching_it(name):
     item = load_object(name)
     body = shapely.Polygon(item.geometry.outline)

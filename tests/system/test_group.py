@@ -104,6 +104,7 @@ def along(run, task):
     return result
 
 
+@pytest.mark.long
 def test_a_trajectory_is_followed_and_one_that_begins_elsewhere_refused(run):
     bend = polynomial((0.25,), 0.5, 0.05, 0.05, -0.5 * math.pi)
     result = along(run, bend)
@@ -158,6 +159,7 @@ def test_a_robot_that_dies_is_left_and_the_others_go_on():
         assert job.dead in ((), (1,)), "it may have stood out of everybody's way"
 
 
+@pytest.mark.long
 def test_a_new_goal_replaces_the_old_and_cancel_stops_all(run):
     first, second = np.array([1.0, 0.4, -1.5]), np.array([0.2, -0.2, -1.5708])
     run.teams[""].send_goal(first)

@@ -105,6 +105,7 @@ def test_a_reset_of_the_world_ends_the_job_and_the_next_goal_is_reached(run):
     assert state is not None and state.error_code == 0
 
 
+@pytest.mark.long
 def test_poses_that_are_none_are_refused_and_change_nothing(run):
     """Rows 1 and 23: another source of poses that lies."""
     liar = run.observer.create_publisher(Poses, "/poses", STREAM)
@@ -166,6 +167,7 @@ def test_a_flood_of_goals_ends_with_the_last_one(run):
     assert error(run, goals[-1])[0] < 5e-3
 
 
+@pytest.mark.long
 def test_wild_goals_crash_nothing(run):
     """Row 21, of the goal's topic."""
     random = np.random.default_rng(1)

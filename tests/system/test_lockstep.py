@@ -50,7 +50,7 @@ TEAMS = {
     "own sensing": ("own-sensing", {"own-sensing": {"orientation": False}}),
 }
 """Systems, and parameters of their nodes."""
-RUNS = ("single", *(pytest.param(name, marks=pytest.mark.long) for name in TEAMS))
+RUNS = "single", *TEAMS
 
 
 def noisy(name="single", seed=3):
@@ -199,6 +199,7 @@ def test_all_nodes_know_that_the_world_waits_before_it_moves():
         assert all(c.told and c.lockstep for c in feeds)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", RUNS)
 def test_a_wall_clock_that_leaps_changes_nothing(monkeypatch, name):
     """FAULTS 30: each look at the wall clock finds that 20 s have passed, more than any limit."""

@@ -12,6 +12,7 @@ from push_model.specs import BoxSpec, EnvironmentSpec
 from push_msgs.action import MoveObject
 from push_ros.conversions import grid_to_ros, pose_stamped_to_ros
 from push_scenario.scenario import load_scenario
+from tests.samples import mostly_long
 from tests.system.test_supervision import runs
 
 REPLACED = "a new goal replaces this one"
@@ -41,7 +42,7 @@ def ahead(run, way, aside=0.0, turn=0.0):
     return there
 
 
-@pytest.mark.parametrize("aside", [-0.05, 0.05])
+@pytest.mark.parametrize("aside", mostly_long([-0.05, 0.05], 1))
 def test_a_goal_that_moves_is_planned_for_while_the_robot_pushes(aside):
     """It never stops: the new plan begins with the push under way."""
     with runs(load_scenario("short")) as run:

@@ -63,7 +63,8 @@ def pushing(run, goal):
     run.spin_until(lambda: False, 1.0)
 
 
-@pytest.mark.parametrize("system", ["swarm", pytest.param("group", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("system", ["swarm", "group"])
 def test_the_job_is_taken_up_again_and_ends_at_the_goal(monkeypatch, system):
     goal = np.array(SYSTEMS[system].VALUES["goal"])
     with running(monkeypatch, system) as run:

@@ -161,6 +161,7 @@ def test_the_printed_law_refuses_walls():
         assert "printed law" in run.observer.state.refusal
 
 
+@pytest.mark.long
 def test_the_rest_finish_when_robots_die_and_leave():
     events = [
         {"kind": "kill", "at": 5.0, "robot": "e1"},

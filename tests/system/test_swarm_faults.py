@@ -48,6 +48,7 @@ def test_when_the_object_is_not_seen_all_stand_and_go_on_when_it_is():
         assert not run.supervisor.method.job.dead
 
 
+@pytest.mark.long
 def test_a_robot_that_is_not_seen_stands_and_the_others_go_on():
     """Rows 7 and 14."""
     events = [{"kind": "drop_poses", "at": 8.0, "bodies": ["e1", "e2"], "duration": 200.0}]
