@@ -24,23 +24,40 @@ from push_scenario.bodies import load_robot
 from push_study.pool import Row
 from push_study.statistics import wilson
 from push_study.study import StudyOptions
-from push_study.team_run import made_scenario, run_team
+from push_study.team_run import TRACE, made_scenario, run_team
 from push_study.uncertainty import uncertainty
 
+
+@dataclass(frozen=True)
+class Recorded:
+    """What the authors recorded, in ten runs that all reach the goal.
+
+    mean, std: [s] of the time. first_motion: [s] mean time after which the object is 1 cm closer to
+    the goal. pace: [m/s] at which it approaches the goal from then on, in steps of 2 s: mean over
+    the runs of the median. fastest: [m/s] greatest such step of all runs.
+    """
+
+    mean: float
+    std: float
+    first_motion: float
+    pace: float
+    fastest: float
+
+
 PUBLISHED = {
-    "gibbs-2": (725, 88, 184),
-    "gibbs-4": (446, 92, 138),
-    "gibbs-10": (297, 20, 57),
-    "gibbs-20": (259, 16, 42),
+    "gibbs-2": Recorded(725, 88, 184, 0.0032, 0.0053),
+    "gibbs-4": Recorded(446, 92, 138, 0.0055, 0.0100),
+    "gibbs-10": Recorded(297, 20, 57, 0.0075, 0.0119),
+    "gibbs-20": Recorded(259, 16, 42, 0.0081, 0.0138),
 }
-"""[s] mean and standard deviation of ten runs each, all of which reach the goal, and mean time
-after which the object has moved by 1 cm: computed from the recordings of the authors
-(rezeck/grf_transport, folder exp_scalability of July 2021)."""
+"""Computed from the recordings of the authors (rezeck/grf_transport, folder exp_scalability of July
+2021), which contain the object's distance from the goal, but no robots."""
 SCENARIOS = tuple(PUBLISHED)
 OPTIONS = {"uncertainty": "mild", "world": "planar"}
 ROOM, START, GOAL = 4.0, (0.0, 0.55, 0.0), (0.0, -1.15)  # [m]; 1.7 m apart, as in the recordings
 _APART, _REACHED, _LIMIT = 0.2, 0.1, 900.0  # [m], [m], [s]
 _MOVED = 0.01  # [m] closer to the goal: the object moves
+_PACE = 2.0  # [s] over which its speed is taken
 _BODY, _HALF_TRACK, _WHEEL = 0.036, 0.03115, 0.026  # [m]
 _HAT = RingBumper(radius=0.04, z=0.064, height=0.02)
 _RIM, _ABOVE = 0.034, 1.5e-3  # [m] from the axle to where the body's rim touches the floor; over it
@@ -119,7 +136,7 @@ def trial(task: PaperTask) -> Row:
     """To the goal, or until the time of the recordings is over.
 
     ``first_motion_s``: after which the object has moved towards the goal; ``nearest_m``: that it
-    came to it.
+    came to it; ``pace_m_s``, ``fastest_m_s``: median and greatest speed towards it, see Recorded.
     """
     count = int(task.scenario.split("-")[1])
     begin = starts(np.random.default_rng([task.seed, count]), count)
@@ -146,42 +163,69 @@ def trial(task: PaperTask) -> Row:
     away = np.hypot(*(np.array(outcome.trace.ways)[:, 0, :2] - GOAL).T)
     moves = away < away[0] - _MOVED
     times = np.array(outcome.trace.times)
-    first = float(times[moves.argmax()] - times[0]) if moves.any() else math.nan
     row = {"scenario": task.scenario, "seed": task.seed, "success": outcome.success}
-    return row | {"first_motion_s": first, "nearest_m": float(away.min())} | outcome.row()
+    row["nearest_m"] = float(away.min())
+    if moves.any():
+        first = int(moves.argmax())
+        row["first_motion_s"] = float(times[first] - times[0])
+        row |= paces(away[first:])
+    return row | outcome.row()
+
+
+def paces(away: Array) -> Row:
+    """Of distances ``(n,)`` [m] from the goal, every ``TRACE`` seconds; none of too few."""
+    steps = -np.diff(away[:: round(_PACE / TRACE)]) / _PACE
+    if not len(steps):
+        return {}
+    return {"pace_m_s": float(np.median(steps)), "fastest_m_s": float(steps.max())}
 
 
 def statistics(rows: list[Row]) -> dict[str, Any]:
     """Reached, and time of what was reached, beside the published figure."""
     found: dict[str, Any] = {}
-    for name, (mean, std, moved) in PUBLISHED.items():
+    for name, theirs in PUBLISHED.items():
         mine = [r for r in rows if r["scenario"] == name]
         if mine:
             times = [r["duration_s"] for r in mine if r["success"]]
-            firsts = np.array([r["first_motion_s"] for r in mine if "first_motion_s" in r])
-            firsts = firsts[np.isfinite(firsts)]
+            moved = [r for r in mine if "pace_m_s" in r]
             found[name] = {
                 "reached": len(times),
                 "of": len(mine),
                 "wilson": wilson(len(times), len(mine)),
-                "time_mean_s": float(np.mean(times)) if times else math.nan,
+                "time_mean_s": _mean(times),
                 "time_std_s": float(np.std(times)) if times else math.nan,
-                "first_motion_mean_s": float(firsts.mean()) if firsts.size else math.nan,
-                "published_mean_s": mean,
-                "published_std_s": std,
-                "published_first_motion_s": moved,
+                "first_motion_mean_s": _mean([r["first_motion_s"] for r in moved]),
+                "pace_mean_m_s": _mean([r["pace_m_s"] for r in moved]),
+                "fastest_m_s": max((r["fastest_m_s"] for r in moved), default=math.nan),
+                "published_mean_s": theirs.mean,
+                "published_std_s": theirs.std,
+                "published_first_motion_s": theirs.first_motion,
+                "published_pace_m_s": theirs.pace,
+                "published_fastest_m_s": theirs.fastest,
             }
     return found
 
 
+def _mean(values: Sequence[float]) -> float:
+    return float(np.mean(values)) if len(values) else math.nan
+
+
 def conclude(options: StudyOptions, tasks: Sequence[PaperTask], rows: list[Row]) -> None:
-    """A line for each setting."""
-    print("\n                              ours                  |  published (10 of 10)")
-    print("setting        reached   time [s]  first motion [s] |  time [s]  first motion [s]")
+    """Two lines for each setting: ours, and what was published."""
+    print("\nsetting               reached     time [s]  first motion [s]  median, greatest [cm/s]")
     for name, s in statistics(rows).items():
-        print(
-            f"{name:12s} {s['reached']:3d} of {s['of']:<3d} {s['time_mean_s']:5.0f} ± "
-            f"{s['time_std_s']:<4.0f} {s['first_motion_mean_s']:11.0f}      | "
-            f"{s['published_mean_s']:4d} ± {s['published_std_s']:<3d}"
-            f" {s['published_first_motion_s']:11d}"
+        ours = Recorded(
+            s["time_mean_s"],
+            s["time_std_s"],
+            s["first_motion_mean_s"],
+            s["pace_mean_m_s"],
+            s["fastest_m_s"],
         )
+        print(_line(f"{name}, ours", s["reached"], s["of"], ours))
+        print(_line(f"{name}, published", 10, 10, PUBLISHED[name]))
+
+
+def _line(label: str, reached: int, of: int, runs: Recorded) -> str:
+    time = f"{runs.mean:5.0f} ± {runs.std:<4.0f} {runs.first_motion:11.0f}"
+    pace = f"{100 * runs.pace:15.2f}, {100 * runs.fastest:.2f}"
+    return f"{label:21s} {reached:2d} of {of:<2d} {time} {pace}"

@@ -57,7 +57,12 @@ MEASURED = {
         for q in ("contact_friction", "com_x", "com_y", "latency")
         for k, v in (("holds", True), ("ratio", 0.2))
     },
-    "rival-papers": {"duration_s": 300.0, "first_motion_s": 40.0},
+    "rival-papers": {
+        "duration_s": 300.0,
+        "first_motion_s": 40.0,
+        "pace_m_s": 0.01,
+        "fastest_m_s": 0.05,
+    },
     "changing-world": {**ENDED, "changed_at_s": 3.0},
     "three-push": {**ENDED, "pushes": 3, "slid_m": 1e-3},
     "line-tracking": {"final_error_m": 1e-3, "solve_time_ms": 1.0, "solve_time_p99_ms": 2.0},

@@ -122,12 +122,23 @@ def test_robots_of_the_paper_start_apart_from_each_other_and_from_the_object():
         assert gaps.min() > 0.2 and np.abs(places).max() <= 1.8
 
 
+def test_the_speed_of_an_object_is_that_towards_the_goal():
+    """It stands for a second, goes at 1 cm/s for ten and at 5 cm/s for two, then back."""
+    step = 0.2 * np.repeat([0.0, 0.01, 0.05, -0.02], [5, 50, 10, 15])
+    away = 1.7 - np.concatenate([[0.0], step.cumsum()])
+    found = rival_papers.paces(away)
+    assert found["pace_m_s"] == pytest.approx(0.01)
+    assert found["fastest_m_s"] == pytest.approx((0.05 * 5 + 0.01 * 5) / 10)
+    assert rival_papers.paces(away[:10]) == {}
+
+
 @pytest.mark.long
 def test_equal_seeds_give_equal_runs_in_the_setting_of_the_paper(tmp_path, capsys):
     task = rival_papers.PaperTask("gibbs-4", 1, str(tmp_path), "planar", "mild", 60.0)
     rows = [rival_papers.trial(task) for _ in range(2)]
     assert rows[0] == rows[1] and not rows[0]["success"]
     assert 5.0 < rows[0]["first_motion_s"] < 60.0 and 0.1 < rows[0]["nearest_m"] < 1.69
+    assert 0.0 <= rows[0]["pace_m_s"] < rows[0]["fastest_m_s"] < 0.12, "the speed of a robot"
     reached = rows[0] | {"success": True, "duration_s": 400.0}
     statistics = rival_papers.statistics([rows[0], reached])["gibbs-4"]
     assert statistics["reached"] == 1 and statistics["of"] == 2
