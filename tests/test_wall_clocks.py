@@ -66,7 +66,7 @@ DECIDES_NOTHING = {
     "lockstep; a time budget only where the asker gives one, in wall time by its definition",
     "push_planner/node.py:PlannerNode._now": "stamps of messages",
     "push_planner/node.py:PlannerNode._succeed": COST,
-    "push_study/rivals/stable_nmpc.py:StableNmpcMethod.step": COST,
+    "push_study/rivals/lone_pusher.py:LonePusher.step": COST,
     "push_study/rivals/stable_nmpc.py:StableNmpcMethod._solve": COST,
     "push_mpc/ltv_mpc.py": COST,
     "push_mpc/contact_force_mpc.py": COST,

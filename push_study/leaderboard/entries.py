@@ -82,6 +82,7 @@ ENTRIES = (
         "Tang et al., RA-L 2023",
         reconstructed=True,
     ),
+    Entry("reactive pusher", "reactive", _ALL, frozenset({POSES}), "this project, a baseline"),
     Entry("group", "group", _ALL, frozenset({PLATES})),
     Entry(
         "printed group law",

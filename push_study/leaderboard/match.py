@@ -66,9 +66,10 @@ def play(match: Match) -> Row:
         "cpu_s": spent,
     }
     if row["success"]:
-        direct, ways = straight(problem), np.array(outcome.trace.ways)[:, 0]
+        direct, (ways, *robots) = straight(problem), np.array(outcome.trace.ways).swapaxes(0, 1)
         row["lambda"] = outcome.charged * problem.robot.max_speed / direct
         row["path_ratio"] = _length(ways) / direct
+        row["robot_path_m"] = float(np.mean([_length(r) for r in robots]))
         row["clearance_m"] = _clearance(problem, ways)
     elif outcome.success and not reached:
         row["reason"] = f"touched obstacles, in {outcome.trace.obstacle_ticks} ticks"
@@ -117,6 +118,6 @@ def _clearance(problem: Problem, ways: Array) -> float:
 
 
 def _length(ways: Array) -> float:
-    """[m] of the path of an object, sampled so coarsely that noise of the physics is no way."""
+    """[m] of the path of a body, sampled so coarsely that noise of the physics is no way."""
     steps = np.hypot(*np.diff(ways[::5, :2], axis=0).T)
     return float(steps.sum())

@@ -21,6 +21,7 @@ HEADS = (
     "Λ, 95 % interval",
     "time [s]",
     "path / straight",
+    "robot's path [m]",
     "clearance [mm]",
     "CPU [s]",
     "leads",
@@ -29,7 +30,7 @@ HEADS = (
 COLUMNS = (
     *("contest", "rank", "method", "outline", "robots", "control", "trials", "successes"),
     *("share_low", "share_high", "lambda", "lambda_low", "lambda_high", "time_s", "path_ratio"),
-    *("cpu_s", "clearance_m", "leads", "ranked", "why_not", "source"),
+    *("robot_path_m", "cpu_s", "clearance_m", "leads", "ranked", "why_not", "source"),
 )
 
 
@@ -92,6 +93,7 @@ def _row(c: Cell) -> list[Any]:
         _span(c.lambda_interval),
         _number(c.seconds, 1),
         _number(c.path, 2),
+        _number(c.robot_path, 2),
         _number(1e3 * c.clearance, 1),
         _number(c.cpu, 1),
         ", ".join(c.leads) or "–",
@@ -104,7 +106,7 @@ def _line(c: Cell) -> list[Any]:
     return [
         *(c.contest, c.rank or "", c.entry.name, told.outline, told.robots, told.control),
         *(c.trials, c.successes, c.share[0], c.share[1], _csv(c.lambda_)),
-        *map(_csv, (*c.lambda_interval, c.seconds, c.path, c.cpu, c.clearance)),
+        *map(_csv, (*c.lambda_interval, c.seconds, c.path, c.robot_path, c.cpu, c.clearance)),
         *(";".join(c.leads), c.entry.ranked, c.entry.why_not, c.entry.source),
     ]
 

@@ -22,9 +22,10 @@ Interval = tuple[float, float]
 
 @dataclass(frozen=True)
 class Cell:
-    """A method at a contest. lambda_, path, cpu: means over what succeeded (cpu: over all), nan
-    where nothing did. clearance: [m] least of the object over what succeeded. rank: 0 where it is
-    not ranked. leads: names of methods that it leads."""
+    """A method at a contest. lambda_, path, robot_path, cpu: means over what succeeded (cpu: over
+    all), nan where nothing did. path: of the object, over the straight line; robot_path: [m] of a
+    robot. clearance: [m] least of the object over what succeeded. rank: 0 where it is not ranked.
+    leads: names of methods that it leads."""
 
     contest: str
     entry: Entry
@@ -35,6 +36,7 @@ class Cell:
     lambda_interval: Interval
     seconds: float
     path: float
+    robot_path: float
     cpu: float
     clearance: float
     rank: int = 0
@@ -70,6 +72,7 @@ def _cell(contest: str, method: str, entry: Entry, rows: Sequence[Row]) -> Cell 
         mean_interval(values),
         _mean(np.array([r["charged_s"] for r in good])),
         _mean(np.array([r["path_ratio"] for r in good])),
+        _mean(np.array([r["robot_path_m"] for r in good])),
         _mean(np.array(cpu)),
         min((float(r["clearance_m"]) for r in good), default=math.nan),
     )

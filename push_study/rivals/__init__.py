@@ -1,1 +1,1 @@
-"""Other people's swarms, reconstructed from their papers, for the experiment swarm-rivals."""
+"""Methods that ours are compared with: other people's, reconstructed, and a baseline."""

@@ -95,8 +95,8 @@ class ReactivePusher(LonePusher):
 
     def _look(self, robot: Array, seen: Array, belief: Belief) -> None:
         """Choose a side and a path, and set out."""
-        spec, self._item = belief.robot(self._name), belief.object(self._arena.object)
-        item, near = self._item.mass_pose(seen), self._side.near
+        spec, near = belief.robot(self._name), self._side.near
+        item = self._item.mass_pose(seen)
         near.believe(spec, self._item)
         missed = self._off(item)
         if not missed:

@@ -22,7 +22,6 @@ from push_study.rivals.stable_nmpc import (
     METHOD,
     StableNmpcMethod,
     StableNmpcSettings,
-    check_team,
     grips,
 )
 from push_study.rivals.stable_programme import ACCELERATION, MARGIN, StableProgramme, cubic
@@ -136,10 +135,10 @@ def test_what_it_cannot_do_is_refused_with_the_reason(arena, task, words):
 
 def test_teams_it_cannot_drive_are_refused():
     with pytest.raises(SettingsError, match="takes one"):
-        check_team({"e0": ROBOT, "e1": ROBOT}, BOX)
+        METHOD.check({"e0": ROBOT, "e1": ROBOT}, BOX)
     with pytest.raises(SettingsError, match="flat bumper"):
-        check_team({"e0": load_robot("epuck_ring")}, BOX)
-    check_team({"e0": ROBOT}, BOX)
+        METHOD.check({"e0": load_robot("epuck_ring")}, BOX)
+    METHOD.check({"e0": ROBOT}, BOX)
 
 
 def test_a_goal_that_no_stable_push_reaches_ends_the_task_with_that_reason(arena):
