@@ -3,6 +3,8 @@
 The package ``launch`` is part of a ROS installation, not of the wheels. Only ``describe`` needs it.
 """
 
+import atexit
+import shutil
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -102,6 +104,7 @@ def _start(context: Any, system: str) -> list[Any]:
     values.setdefault("system", system)
     respawn = values["respawn"].lower() in ("true", "1", "yes")
     folder = Path(tempfile.mkdtemp("-planar-push"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
     actions = []
     for process in processes_of(values, folder):
         ended = None if respawn else Shutdown(reason=f"{process.name} has ended")

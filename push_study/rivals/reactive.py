@@ -63,7 +63,8 @@ class ReactiveSettings:
         0.15,
         low=0.01,
         high=2.0,
-        doc="Distance along the path from the object to the point that it is steered to (m).",
+        doc="Distance along the path between the object and the point towards which it is steered "
+        "(m).",
     )
     bend: float = bounded(
         2.5, low=0.01, high=20.0, doc="Greatest curvature of the robot's path in a push (1/m)."
