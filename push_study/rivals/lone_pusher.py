@@ -15,6 +15,7 @@ from push_model import se2
 from push_model.arrays import Array
 from push_model.belief import POSES, Belief
 from push_model.jobs import GoalRefused, JobError, JobPhase
+from push_model.settings import bounded, settings
 from push_study.rivals.side_contact import SideContact
 
 _FILTER = 0.2  # [s] time constant of where the object is on the bumper
@@ -24,11 +25,28 @@ STILL = 0.3
 """[s] from the last command of a push to the verdict."""
 
 
+@settings
+class GoalTolerances:
+    """When an object is at its goal."""
+
+    position_tolerance: float = bounded(
+        0.02,
+        low=1e-3,
+        high=1.0,
+        doc="Greatest position error at which the goal counts as reached (m).",
+    )
+    orientation_tolerance: float = bounded(
+        0.1,
+        low=1e-3,
+        high=3.2,
+        doc="Greatest heading error at which the goal counts as reached (rad).",
+    )
+
+
 class LonePusher(ABC):
     """A method (see ``push_job.method``): looks for a push, drives to its side, and pushes."""
 
-    def __init__(self, arena: Arena, name: str, tolerances: tuple[float, float]) -> None:
-        """tolerances: [m], [rad] within which the goal counts as reached."""
+    def __init__(self, arena: Arena, name: str, tolerances: GoalTolerances) -> None:
         (self._name,), self._arena = arena.robots, arena
         self._method, self._tolerances = name, tolerances
         self._side = SideContact(arena)
@@ -171,12 +189,9 @@ class LonePusher(ABC):
 
     def _off(self, item: Array) -> str:
         """How far the object is from its goal, in words; empty within the tolerances."""
-        off, (near, straight) = (
-            se2.between(self._item.mass_pose(self._goal), item),
-            self._tolerances,
-        )
+        off, s = se2.between(self._item.mass_pose(self._goal), item), self._tolerances
         away, turned = float(np.hypot(off[0], off[1])), abs(float(off[2]))
-        if away <= near and turned <= straight:
+        if away <= s.position_tolerance and turned <= s.orientation_tolerance:
             return ""
         return f"{1e3 * away:.0f} mm, {turned:.2f} rad from the goal"
 

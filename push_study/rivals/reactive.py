@@ -32,7 +32,7 @@ from push_model.settings import bounded, settings
 from push_model.specs import RobotSpec
 from push_model.stable_push import contact_on_side
 from push_planner.guide_path import lattice_path
-from push_study.rivals.lone_pusher import STILL, LonePusher
+from push_study.rivals.lone_pusher import STILL, GoalTolerances, LonePusher
 from push_study.rivals.side_contact import SECTIONS, check_team
 
 _LOST = 0.3  # [s] in doubt until contact counts as lost
@@ -43,21 +43,9 @@ _BEYOND = 0.3  # [m] of straight path that is aimed at beyond the goal
 
 
 @settings
-class ReactiveSettings:
+class ReactiveSettings(GoalTolerances):
     """Tolerances, and how the object is steered."""
 
-    position_tolerance: float = bounded(
-        0.02,
-        low=1e-3,
-        high=1.0,
-        doc="Greatest position error at which the goal counts as reached (m).",
-    )
-    orientation_tolerance: float = bounded(
-        0.1,
-        low=1e-3,
-        high=3.2,
-        doc="Greatest heading error at which the goal counts as reached (rad).",
-    )
     push_speed: float = bounded(0.125, low=1e-3, high=1.0, doc="Speed of a push (m/s).")
     look_ahead: float = bounded(
         0.15,
@@ -80,8 +68,7 @@ class ReactivePusher(LonePusher):
 
     def __init__(self, arena: Arena) -> None:
         self._own: ReactiveSettings = arena.section("", ReactiveSettings)
-        own = self._own
-        super().__init__(arena, "reactive", (own.position_tolerance, own.orientation_tolerance))
+        super().__init__(arena, "reactive", self._own)
         self._path, self._pushes = np.zeros((0, 2)), 0
 
     @property
@@ -92,7 +79,7 @@ class ReactivePusher(LonePusher):
     def begin(self, task: Task, belief: Belief) -> None:
         """See Method."""
         super().begin(task, belief)
-        self._path, self._pushes = np.zeros((0, 2)), 0
+        self._path, self._pushes, self._backed = np.zeros((0, 2)), 0, False
 
     def _look(self, robot: Array, seen: Array, belief: Belief) -> None:
         """Choose a side and a path, and set out."""
@@ -105,7 +92,8 @@ class ReactivePusher(LonePusher):
         elif self._pushes >= self._own.attempts:
             text = f"the object is {missed} after {self._pushes} pushes"
             self.end(JobError.OFF_TARGET, text)
-        elif near.touching(robot, seen):
+        elif near.touching(robot, seen) and not self._backed:
+            self._backed = True  # once: there may be no room
             self._back_off(robot, seen)
         else:
             blocked = "no way of the object leads to the goal"
@@ -147,7 +135,7 @@ class ReactivePusher(LonePusher):
         self._pushes += 1
         self._over = self._gone = 0.0
         self._watched, self._since, self._asked = item[:2].copy(), 0.0, 0.0
-        self._stuck = False
+        self._stuck = self._backed = False
 
     def _push(self, dt: float, now: Array, item: Array, lost: Array) -> tuple[float, float]:
         v, omega = self._steered(se2.compose(now, self._measured), float(now[2]))

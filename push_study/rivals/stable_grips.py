@@ -11,24 +11,13 @@ from push_model.settings import bounded, settings
 from push_model.shapes import Side
 from push_model.specs import RobotSpec
 from push_model.stable_push import CurvatureLimits, contact_on_side, curvature_limits
+from push_study.rivals.lone_pusher import GoalTolerances
 
 
 @settings
-class StableNmpcSettings:
+class StableNmpcSettings(GoalTolerances):
     """Tolerances, and the programme."""
 
-    position_tolerance: float = bounded(
-        0.02,
-        low=1e-3,
-        high=1.0,
-        doc="Greatest position error at which the goal counts as reached (m).",
-    )
-    orientation_tolerance: float = bounded(
-        0.1,
-        low=1e-3,
-        high=3.2,
-        doc="Greatest heading error at which the goal counts as reached (rad).",
-    )
     friction_trust: float = bounded(
         0.85,
         low=0.1,

@@ -53,8 +53,7 @@ class StableNmpcMethod(LonePusher):
 
     def __init__(self, arena: Arena) -> None:
         self._own: StableNmpcSettings = arena.section("", StableNmpcSettings)
-        own = self._own
-        super().__init__(arena, "stable-nmpc", (own.position_tolerance, own.orientation_tolerance))
+        super().__init__(arena, "stable-nmpc", self._own)
         self._nmpc = StableProgramme(arena.grid, arena.robot, arena.item)
         self._plan: Plan | None = None
         self.solves: list[float] = []  # [s] CPU time of each since the push began

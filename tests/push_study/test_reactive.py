@@ -83,6 +83,17 @@ def test_an_object_that_is_held_fast_ends_its_attempts():
     assert status.reason
 
 
+def test_a_robot_without_room_to_back_off_goes_on_from_where_it_is():
+    """It stands between the object and a wall."""
+    robot = np.array([-1.454, 0.0, 0.0])
+    item = se2.compose(robot, np.array([ROBOT.push_distance + 0.045, 0.0, 0.0]))
+    run = Pushed([0.5, 0.9, 1.0], start=item)
+    run.world = PlanarWorld(ROOM, {"e0": (ROBOT, robot)}, {OBJECT: (BOX, item)})
+    status = run.until_it_ends(60.0)
+    assert status.phase == JobPhase.IDLE and status.code == JobError.NONE, status
+    assert status.pushes >= 1
+
+
 @pytest.mark.parametrize(
     ("task", "words"),
     [
