@@ -1,69 +1,29 @@
 """Do the reconstructions of other people's methods reach the figures of their own papers?
 
-Each scenario is a setting of a paper as far as its authors published it, in text or code. Only the
-Gibbs random field has a setting and figures that could be read (docs/rivals.md).
+Each scenario is a setting of a paper as far as its authors published it, in text or code: the Gibbs
+random field with 2 to 20 robots in one of our worlds, and the global input with 100 robots in the
+simulation of its authors. Other settings and figures could not be read (docs/rivals.md).
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from push_job.method import Task
-from push_model.arrays import Array
-from push_model.bumpers import RingBumper
-from push_model.drives import SpeedDrive
-from push_model.outlines import distance, inside
-from push_model.se2 import transform
 from push_model.settings import SettingsError
-from push_model.shape_specs import RectangleShape
-from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
-from push_scenario.bodies import load_robot
 from push_study.pool import Row
+from push_study.reproductions import gibbs, global_input
 from push_study.statistics import wilson
 from push_study.study import StudyOptions
-from push_study.team_run import TRACE, made_scenario, run_team
-from push_study.uncertainty import uncertainty
 
-
-@dataclass(frozen=True)
-class Recorded:
-    """What the authors recorded, in ten runs that all reach the goal.
-
-    mean, std: [s] of the time. first_motion: [s] mean time after which the object is 1 cm closer to
-    the goal. pace: [m/s] at which it approaches the goal from then on, in steps of 2 s: mean over
-    the runs of the median. fastest: [m/s] greatest such step of all runs.
-    """
-
-    mean: float
-    std: float
-    first_motion: float
-    pace: float
-    fastest: float
-
-
-PUBLISHED = {
-    "gibbs-2": Recorded(725, 88, 184, 0.0032, 0.0053),
-    "gibbs-4": Recorded(446, 92, 138, 0.0055, 0.0100),
-    "gibbs-10": Recorded(297, 20, 57, 0.0075, 0.0119),
-    "gibbs-20": Recorded(259, 16, 42, 0.0081, 0.0138),
-}
-"""Computed from the recordings of the authors (rezeck/grf_transport, folder exp_scalability of July
-2021), which contain the object's distance from the goal, but no robots."""
-SCENARIOS = tuple(PUBLISHED)
+GLOBAL = f"global-{global_input.ROBOTS}"
+SCENARIOS = (*gibbs.PUBLISHED, GLOBAL)
 OPTIONS = {"uncertainty": "mild", "world": "planar"}
-ROOM, START, GOAL = 4.0, (0.0, 0.55, 0.0), (0.0, -1.15)  # [m]; 1.7 m apart, as in the recordings
-_APART, _REACHED, _LIMIT = 0.2, 0.1, 900.0  # [m], [m], [s]
-_MOVED = 0.01  # [m] closer to the goal: the object moves
-_PACE = 2.0  # [s] over which its speed is taken
-_BODY, _HALF_TRACK, _WHEEL = 0.036, 0.03115, 0.026  # [m]
-_HAT = RingBumper(radius=0.04, z=0.064, height=0.02)
-_RIM, _ABOVE = 0.034, 1.5e-3  # [m] from the axle to where the body's rim touches the floor; over it
-_FASTEST, _TORQUE, _FRICTION = 0.25, 0.3, 0.8  # [m/s], [Nm]: more than is asked for; of wheels
-_OBJECT = ObjectSpec(
-    RectangleShape(0.5, 0.4), mass=0.2, height=0.3, floor_friction=0.3, contact_friction=0.2
+_PACES = (
+    ("first_motion_mean_s", "pace_mean_m_s", "fastest_m_s"),
+    ("published_first_motion_s", "published_pace_m_s", "published_fastest_m_s"),
 )
 
 
@@ -76,15 +36,26 @@ class PaperTask:
     out: str
     world: str
     uncertainty: str
-    limit: float = _LIMIT
+    limit: float = gibbs.LIMIT
 
 
 def tasks(options: StudyOptions) -> list[PaperTask]:
-    """As many of each; raises SettingsError for what is no setting."""
+    """As many of each.
+
+    Raises
+    ------
+    SettingsError: for what is no setting, an option that no setting uses, and where something that
+        one needs is not installed.
+    """
     for name in options.scenarios:
-        if name not in PUBLISHED:
-            known = ", ".join(PUBLISHED)
+        if name not in SCENARIOS:
+            known = ", ".join(SCENARIOS)
             raise SettingsError(f"no setting called '{name}'; expected one of: {known}")
+    unused = ", ".join(f"--{name}" for name in sorted(options.asked & OPTIONS.keys()))
+    if set(options.scenarios) == {GLOBAL} and unused:
+        raise SettingsError(f"{GLOBAL} has a simulation of its own; leave out {unused}")
+    if GLOBAL in options.scenarios:
+        global_input.ready()
     world = options.world or OPTIONS["world"]
     return [
         PaperTask(name, options.seed + k, str(options.out), world, options.uncertainty)
@@ -93,116 +64,47 @@ def tasks(options: StudyOptions) -> list[PaperTask]:
     ]
 
 
-def hero() -> RobotSpec:
-    """Their robot as of February 2021 (verlab/hero_common): a cylinder with a wider hat, which is
-    what touches objects; the wheels' motors have the inertia of an e-puck's."""
-    epuck = load_robot("epuck_ring")
-    assert isinstance(epuck.drive, SpeedDrive)
-    drive = replace(
-        epuck.drive,
-        wheel_radius=_WHEEL,
-        half_track=_HALF_TRACK,
-        max_wheel_speed=_FASTEST / _WHEEL,
-        wheel_mass=0.01,
-        wheel_torque=_TORQUE,
-        wheel_friction=_FRICTION,
-    )
-    return RobotSpec(
-        drive,
-        _HAT,
-        body_radius=_BODY,
-        body_height=0.048,
-        mass=0.12,
-        casters=(_RIM, -_RIM),
-        caster_clearance=_ABOVE,
-    )
-
-
-def starts(random: np.random.Generator, count: int) -> Array:
-    """``(count, 3)`` poses anywhere in the room, apart from each other and from the object, as the
-    authors' script draws them; heading 0."""
-    outline = transform(np.array(START), _OBJECT.outline)
-    found: list[Array] = []
-    while len(found) < count:
-        place = 0.9 * ROOM * random.uniform(-0.5, 0.5, 2)
-        clear = not inside(outline, place[None])[0]
-        clear &= bool(distance(outline, place[None])[0] > 1.1 * _HAT.radius)
-        if clear and all(np.hypot(*(place - p)) > _APART for p in found):
-            found.append(place)
-    return np.column_stack([np.array(found), np.zeros(count)])
-
-
 def trial(task: PaperTask) -> Row:
-    """To the goal, or until the time of the recordings is over.
-
-    ``first_motion_s``: after which the object has moved towards the goal; ``nearest_m``: that it
-    came to it; ``pace_m_s``, ``fastest_m_s``: median and greatest speed towards it, see Recorded.
-    """
-    count = int(task.scenario.split("-")[1])
-    begin = starts(np.random.default_rng([task.seed, count]), count)
-    room = EnvironmentSpec((ROOM, ROOM), resolution=0.05)
-    settings = {
-        "position_tolerance": _REACHED,
-        "orientation": False,
-        "stalled": _LIMIT,
-        "seed": task.seed,
-    }
-    start = np.array(START)
-    scenario = made_scenario(
-        task.scenario, room, hero(), begin, _OBJECT, start, {"gibbs": settings}
-    )
-    outcome = run_team(
-        "gibbs",
-        scenario,
-        Task((np.array([*GOAL, math.nan]),)),
-        uncertainty(task.uncertainty),
-        task.seed,
-        task.limit,
-        world=task.world,
-    )
-    away = np.hypot(*(np.array(outcome.trace.ways)[:, 0, :2] - GOAL).T)
-    moves = away < away[0] - _MOVED
-    times = np.array(outcome.trace.times)
-    row = {"scenario": task.scenario, "seed": task.seed, "success": outcome.success}
-    row["nearest_m"] = float(away.min())
-    if moves.any():
-        first = int(moves.argmax())
-        row["first_motion_s"] = float(times[first] - times[0])
-        row |= paces(away[first:])
-    return row | outcome.row()
-
-
-def paces(away: Array) -> Row:
-    """Of distances ``(n,)`` [m] from the goal, every ``TRACE`` seconds; none of too few."""
-    steps = -np.diff(away[:: round(_PACE / TRACE)]) / _PACE
-    if not len(steps):
-        return {}
-    return {"pace_m_s": float(np.median(steps)), "fastest_m_s": float(steps.max())}
+    """To the goal, or until the time is over. Rows of the Gibbs random field tell more, see its
+    ``run``."""
+    if task.scenario == GLOBAL:
+        row = global_input.run(task.seed, task.limit)
+    else:
+        count = int(task.scenario.split("-")[1])
+        row = gibbs.run(count, task.seed, task.world, task.uncertainty, task.limit)
+    return {"scenario": task.scenario, "seed": task.seed, **row}
 
 
 def statistics(rows: list[Row]) -> dict[str, Any]:
-    """Reached, and time of what was reached, beside the published figure."""
+    """Reached, and time of what was reached, beside the published figures."""
     found: dict[str, Any] = {}
-    for name, theirs in PUBLISHED.items():
+    for name in SCENARIOS:
         mine = [r for r in rows if r["scenario"] == name]
-        if mine:
-            times = [r["duration_s"] for r in mine if r["success"]]
-            moved = [r for r in mine if "pace_m_s" in r]
-            found[name] = {
-                "reached": len(times),
-                "of": len(mine),
-                "wilson": wilson(len(times), len(mine)),
-                "time_mean_s": _mean(times),
-                "time_std_s": float(np.std(times)) if times else math.nan,
-                "first_motion_mean_s": _mean([r["first_motion_s"] for r in moved]),
-                "pace_mean_m_s": _mean([r["pace_m_s"] for r in moved]),
-                "fastest_m_s": max((r["fastest_m_s"] for r in moved), default=math.nan),
-                "published_mean_s": theirs.mean,
-                "published_std_s": theirs.std,
-                "published_first_motion_s": theirs.first_motion,
-                "published_pace_m_s": theirs.pace,
-                "published_fastest_m_s": theirs.fastest,
-            }
+        if not mine:
+            continue
+        times = [r["duration_s"] for r in mine if r["success"]]
+        found[name] = {
+            "reached": len(times),
+            "of": len(mine),
+            "wilson": wilson(len(times), len(mine)),
+            "time_mean_s": _mean(times),
+            "time_std_s": float(np.std(times)) if times else math.nan,
+        }
+        if name == GLOBAL:
+            mean, std = global_input.PUBLISHED
+            found[name] |= {"published_mean_s": mean, "published_std_s": std}
+            continue
+        theirs, moved = gibbs.PUBLISHED[name], [r for r in mine if "pace_m_s" in r]
+        found[name] |= {
+            "first_motion_mean_s": _mean([r["first_motion_s"] for r in moved]),
+            "pace_mean_m_s": _mean([r["pace_m_s"] for r in moved]),
+            "fastest_m_s": max((r["fastest_m_s"] for r in moved), default=math.nan),
+            "published_mean_s": theirs.mean,
+            "published_std_s": theirs.std,
+            "published_first_motion_s": theirs.first_motion,
+            "published_pace_m_s": theirs.pace,
+            "published_fastest_m_s": theirs.fastest,
+        }
     return found
 
 
@@ -214,18 +116,18 @@ def conclude(options: StudyOptions, tasks: Sequence[PaperTask], rows: list[Row])
     """Two lines for each setting: ours, and what was published."""
     print("\nsetting               reached     time [s]  first motion [s]  median, greatest [cm/s]")
     for name, s in statistics(rows).items():
-        ours = Recorded(
-            s["time_mean_s"],
-            s["time_std_s"],
-            s["first_motion_mean_s"],
-            s["pace_mean_m_s"],
-            s["fastest_m_s"],
-        )
-        print(_line(f"{name}, ours", s["reached"], s["of"], ours))
-        print(_line(f"{name}, published", 10, 10, PUBLISHED[name]))
+        ours = s["time_mean_s"], s["time_std_s"]
+        published = s["published_mean_s"], s["published_std_s"]
+        here, there = _PACES if name != GLOBAL else ((), ())
+        print(_line(f"{name}, ours", s["reached"], s["of"], ours, [s[k] for k in here]))
+        print(_line(f"{name}, published", 10, 10, published, [s[k] for k in there]))
 
 
-def _line(label: str, reached: int, of: int, runs: Recorded) -> str:
-    time = f"{runs.mean:5.0f} ± {runs.std:<4.0f} {runs.first_motion:11.0f}"
-    pace = f"{100 * runs.pace:15.2f}, {100 * runs.fastest:.2f}"
-    return f"{label:21s} {reached:2d} of {of:<2d} {time} {pace}"
+def _line(
+    label: str, reached: int, of: int, time: tuple[float, float], paces: Sequence[float]
+) -> str:
+    line = f"{label:21s} {reached:2d} of {of:<2d} {time[0]:5.0f} ± {time[1]:<4.0f}"
+    if paces:
+        first, median, greatest = paces
+        line += f" {first:11.0f} {100 * median:15.2f}, {100 * greatest:.2f}"
+    return line

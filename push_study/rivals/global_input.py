@@ -1,151 +1,227 @@
 """One input for all robots: Shahrokhi, Lin, Ertel, Wan and Becker, T-RO 2018.
 
-Value iteration on a 20 x 20 grid says whereto the object goes next (moves in eight directions that
-come out with 0.5, else one of both neighbouring ones; discount 0.97, 200 sweeps; +100, -100, -1).
-The swarm's mean is driven behind the object and against it by a PD law (4, 1), round it by a
-repulsive field in the half plane before it (75 within 3, attraction 2). When the swarm's variance
-is too great, it is driven into the nearest corner until it is small again; when its mean has not
-moved for 5 s, into another one.
+Value iteration on a 20 x 20 grid says whereto the object goes next. The swarm's mean is driven
+behind the object and against it, and round it by a field of potentials; the direction is chosen
+anew every second. When the swarm's variance is too great, its mean is driven into a corner until
+the variance is small again. Every five seconds that ends, unless the mean has stopped: then it is
+driven into another corner. A room with walls in it is divided into regions; mean and variance are
+those of the robots that are in the object's region, and when fewer than half of them are, they are
+gathered first. Constants and rules are those of the code that the authors published
+(aabecker/SwarmControlSandbox, January 2017).
 
-Reconstructed: lengths are in units of two robots' radii, for which the published gains are. The
-point that the mean is driven to lies half the swarm's deviation and the object's radius behind its
-centre, and 0.2 of that beyond the centre when it pushes. Regrouping ends in the corner. Transfer
-regions, of which an open room has none, are left out.
+Reconstructed: their robots are moved by a force of constant size against a drag; ours drive at full
+speed in its direction. Their lengths are those of an object with a circumscribed circle of 1.5;
+ours are scaled by the object. Their corners are chosen for their room; in an open room, the corner
+is the nearest, and after a stop the next one. Their goal is 4 wide; so near to ours, the object
+goes straight to it.
 """
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from push_job.open_room import OpenRoom, open_room_method
-from push_model.arrays import Array
+from push_model.arrays import Array, Mask
 
-_CELLS, _SWEEPS, _DISCOUNT = 20, 200, 0.97
-_KP, _KD = 4.0, 1.0
-_REPULSION, _ATTRACTION, _NEAR = 75.0, 2.0, 3.0
-_STUCK, _STILL = 5.0, 0.02  # [s] without so much [m] of motion
-_CONE = 0.25 * math.pi  # of directions to the mean from which it pushes
-_MOVES = np.array([[0, 1], [1, 1], [1, 0], [1, -1], [0, -1], [-1, -1], [-1, 0], [-1, 1]])
+CELLS = 20
+_WALL = 1  # cells of the grid that the room's own walls take up
+_SWEEPS, _DISCOUNT, _STRAIGHT = 200, 0.97, 0.5
+_GOAL, _STEP, _OBSTACLE = 100.0, -1.0, -100.0  # rewards
+_REACH = 1.5  # of the object, in their lengths
+_ATTRACTION, _REPULSION, _NEAR = 2.0, 75.0, 3.0
+_CONE = 0.25 * math.pi  # of directions from the object to the mean, from which it pushes
+_CLOSE, _BEHIND, _INSIDE = 1.5, 0.8, 0.1  # from the object: less than this; aims
+_HOLD, _WATCH, _STILL = 1.0, 5.0, 0.1  # [s] of a direction; [s] and motion of the mean: stopped
+_MOST, _LEAST = 0.48, 0.18  # variance, by robots and their radius
+_PRESSED, _BESIDE = 0.1, 4.0  # least variance where the mean has stopped so near to the object
+_ENOUGH = 0.5  # of the robots
+_THERE = 2.0  # from the goal
+_MOVES = np.array([[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1]])
+
+
+@dataclass(frozen=True)
+class Region:
+    """A part of a room. cells ``(CELLS, CELLS)`` of the grid, by x and y; corners: where its robots
+    are driven to, and where once they have stopped, in their lengths from the room's middle; None
+    for the nearest corner of the room, and the next ones."""
+
+    cells: Mask
+    corners: tuple[tuple[float, float], tuple[float, float]] | None = None
+
+
+@dataclass(frozen=True)
+class Floor:
+    """A room with walls in it. blocked ``(CELLS, CELLS)``. main: regions that cover it. transfer:
+    regions that join them; the object is in one of these from when it leaves a main region until it
+    leaves that one too. gather: a corner by the object's main region and the two main regions with
+    the most robots.
+    """
+
+    blocked: Mask
+    main: tuple[Region, ...]
+    transfer: tuple[Region, ...] = ()
+    gather: Mapping[tuple[int, frozenset[int]], tuple[float, float]] = field(default_factory=dict)
+
+
+def open_floor() -> Floor:
+    """With nothing but its own walls."""
+    blocked = np.ones((CELLS, CELLS), dtype=bool)
+    blocked[_WALL:-_WALL, _WALL:-_WALL] = False
+    return Floor(blocked, (Region(np.ones_like(blocked)),))
 
 
 class GlobalInput:
     """See the module."""
 
-    def __init__(self, arena: OpenRoom) -> None:
-        self._arena, self._unit = arena, 2.0 * arena.radius
-        outline = arena.item.geometry.outline
-        self._reach = float(np.hypot(*outline.T).max())
+    def __init__(self, arena: OpenRoom, floor: Floor | None = None) -> None:
+        self._arena, self._floor = arena, floor or open_floor()
+        self._unit = float(np.hypot(*arena.item.geometry.outline.T).max()) / _REACH
         self._half = 0.5 * np.array(arena.size)
-        self._policy = self._iterate()
-        self._before: tuple[float, Array] | None = None
-        self._regrouping = False
-        self._corner = 0
-        self._still: tuple[float, Array] | None = None
+        self._ways = self._iterate()
+        self._region, self._is_main = self._floor.main[0], True
+        self._direction, self._chosen = np.array([1.0, 0.0]), -math.inf
+        self._regrouping, self._stopped, self._corner = False, False, 0
+        self._watched: tuple[float, Array] | None = None
+        self._lost: Array | None = None  # corner where too few robots are gathered
 
     def velocities(self, time: float, pose: Array, robots: Array) -> Array:
         """See VelocityLaw."""
-        points = robots[:, :2]
-        mean = points.mean(axis=0)
-        variance = float(points.var(axis=0).sum()) / self._unit**2
-        rate = np.zeros(2)
-        if self._before is not None and time > self._before[0]:
-            rate = (mean - self._before[1]) / (time - self._before[0])
-        self._before = time, mean
-        self._judge(time, mean, variance, len(points))
-        if self._regrouping:
-            goal, push = self._corners()[self._corner], False
-        else:
-            goal, push = self._behind(pose[:2], mean, math.sqrt(variance) * self._unit)
-        u = _KP * (goal - mean) / self._unit - _KD * rate / self._unit
-        if not push:
-            u = self._field(pose[:2], mean, goal)
-        size = float(np.hypot(*u))
-        u = u * min(1.0, 1.0 / max(size, 1e-9)) * self._arena.speed
-        return np.repeat(u[None], len(points), axis=0)
+        u = self._arena.speed * self.direction(time, pose, robots)
+        return np.repeat(u[None], len(robots), axis=0)
 
-    def _judge(self, time: float, mean: Array, variance: float, count: int) -> None:
-        """Whether to regroup, and where."""
-        r, width = 0.5, self._arena.size[0] / self._unit
-        least = 2.5 * r + 0.55 * count * r**2 + 0.003 * width
-        most = 15.0 * r + 0.55 * count * r**2 + 0.006 * width
-        if self._still is None or np.hypot(*(mean - self._still[1])) > _STILL:
-            self._still = time, mean
-        stuck = time - self._still[0] > _STUCK
-        if stuck:
-            self._corner = (self._corner + 1) % 4
-            self._regrouping, self._still = True, (time, mean)
-        elif not self._regrouping and variance > most:
-            away = np.hypot(*(self._corners() - mean).T)
-            self._regrouping, self._corner = True, int(away.argmin())
-        elif self._regrouping and variance < least:
-            away = float(np.hypot(*(self._corners()[self._corner] - mean)))
-            self._regrouping = away > 3.0 * math.sqrt(variance) * self._unit
+    def direction(self, time: float, pose: Array, robots: Array) -> Array:
+        """``(2,)`` unit vector in which all robots are driven; see VelocityLaw."""
+        here, points = pose[:2] / self._unit, robots[:, :2] / self._unit
+        self._enter(pose[:2])
+        with_it = points[self._inside(self._region, robots[:, :2])]
+        if not len(with_it):
+            with_it = points
+        mean, variance = with_it.mean(axis=0), with_it.var(axis=0)
+        few = len(with_it) < _ENOUGH * len(points)
+        self._watch(time, mean)
+        self._gather(few, pose[:2], robots[:, :2])
+        if self._lost is not None:
+            return _unit(self._lost - mean)
+        self._judge(mean, variance, len(with_it), float(np.hypot(*(here - mean))))
+        if self._regrouping:
+            return _unit(self._gathering(mean) - mean)
+        if time - self._chosen > _HOLD or time < self._chosen:
+            self._direction, self._chosen = self._driven(here, mean), time
+        return self._direction
+
+    def _enter(self, place: Array) -> None:
+        """The object's region: it changes between the two kinds when the object leaves one."""
+        if self._inside(self._region, place[None])[0]:
+            return
+        others = self._floor.transfer if self._is_main else self._floor.main
+        found = [r for r in others if self._inside(r, place[None])[0]]
+        if found:
+            self._region, self._is_main = found[0], not self._is_main
+
+    def _watch(self, time: float, mean: Array) -> None:
+        """Every few seconds: whether the mean has stopped. Regrouping ends if it has not."""
+        if self._watched is None or time < self._watched[0]:
+            self._watched = time, mean
+        elif time - self._watched[0] > _WATCH:
+            self._stopped = bool(np.hypot(*(mean - self._watched[1])) < _STILL)
+            if self._stopped and self._regrouping:
+                self._corner += 1
+            elif self._stopped:
+                self._corner = self._nearest(mean)
+            self._regrouping = self._stopped
+            self._watched = time, mean
+
+    def _gather(self, few: bool, place: Array, robots: Array) -> None:
+        """Where robots are to be driven before anything else, if too few are in the region."""
+        if not few or not self._floor.gather:
+            self._lost = None
+        elif self._lost is None:
+            counts = [int(self._inside(r, robots).sum()) for r in self._floor.main]
+            order = sorted(range(len(counts)), key=lambda k: -counts[k])
+            at = [k for k, r in enumerate(self._floor.main) if self._inside(r, place[None])[0]]
+            key = (at or [len(counts) - 1])[0], frozenset(order[:2])
+            if key in self._floor.gather:
+                self._lost = np.array(self._floor.gather[key])
+
+    def _judge(self, mean: Array, variance: Array, count: int, away: float) -> None:
+        """Whether to regroup: by the variance, with hysteresis."""
+        scale = count * self._arena.radius / self._unit
+        least = _PRESSED if self._stopped and away < _BESIDE else _LEAST * scale
+        if (variance < least).all():
+            self._regrouping = False
+        if (variance > _MOST * scale).any():
+            if not self._regrouping:
+                self._corner = self._nearest(mean)
+            self._regrouping = True
+
+    def _gathering(self, mean: Array) -> Array:
+        """The corner in which the robots regroup."""
+        if self._region.corners is not None:
+            return np.array(self._region.corners[int(self._stopped)])
+        corner: Array = self._corners()[self._corner % 4]
+        return corner
+
+    def _nearest(self, mean: Array) -> int:
+        return int(np.hypot(*(self._corners() - mean).T).argmin())
 
     def _corners(self) -> Array:
-        corners: Array = self._half * np.array([[1.0, 1], [-1, 1], [-1, -1], [1, -1]])
+        corners: Array = self._half / self._unit * np.array([[1.0, 1], [-1, 1], [-1, -1], [1, -1]])
         return corners
 
-    def _behind(self, item: Array, mean: Array, spread: float) -> tuple[Array, bool]:
-        """Where the mean is to go, and whether it pushes."""
-        ahead = self._direction(item)
-        away = self._reach + 0.5 * spread
-        offset = item - mean
-        angle = abs(math.atan2(ahead[0] * offset[1] - ahead[1] * offset[0], float(ahead @ offset)))
-        if angle < _CONE and np.hypot(*offset) < 1.5 * away + self._unit:
-            return item + 0.2 * away * ahead, True
-        return item - away * ahead, False
+    def _driven(self, here: Array, mean: Array) -> Array:
+        """Behind the object and against it, or round it; places in their lengths."""
+        back = -self._way(here)
+        behind, offset = _unit(back), mean - here
+        away = float(np.hypot(*offset))
+        off = math.atan2(behind[0] * offset[1] - behind[1] * offset[0], float(behind @ offset))
+        if away < _NEAR and abs(off) > _CONE:
+            away = max(away, 1e-3)
+            aim = here + _BEHIND * behind - mean
+            pull = _ATTRACTION * _unit(aim)
+            size = _REPULSION * (1.0 / away - 1.0 / _NEAR) / away**2
+            return _unit(pull + size * offset)
+        return _unit(here + (_INSIDE if away < _CLOSE else _BEHIND) * back - mean)
 
-    def _field(self, item: Array, mean: Array, goal: Array) -> Array:
-        """Attraction to a place behind the object, repulsion in the half plane before it, or all
-        round where the swarm regroups."""
-        pull = goal - mean
-        u = _ATTRACTION * pull / max(float(np.hypot(*pull)), 1e-9)
-        away = mean - item
-        gap = (float(np.hypot(*away)) - self._reach) / self._unit
-        before = self._regrouping or float(away @ self._direction(item)) > 0.0
-        if before and gap < _NEAR:
-            gap = max(gap, 0.1)
-            strength = _REPULSION * (1.0 / gap - 1.0 / _NEAR) / gap**2
-            unit = away / max(float(np.hypot(*away)), 1e-9)
-            side = np.array([-unit[1], unit[0]])
-            side *= 1.0 if side @ pull >= 0.0 else -1.0  # round it, not to and fro
-            u = u + min(strength, 2.0 * _ATTRACTION) * unit + _ATTRACTION * side
-        return u
+    def _way(self, here: Array) -> Array:
+        """``(2,)`` in which the object is to go; longer where that is to a cell at a corner."""
+        straight: Array = self._arena.target / self._unit - here
+        if np.abs(straight).max() < _THERE:
+            return _unit(straight)
+        way: Array = self._ways[self._cells((here * self._unit)[None])[0]]
+        return way
 
-    def _cell(self, point: Array) -> tuple[int, int]:
-        k = np.floor((point + self._half) / (2.0 * self._half) * _CELLS).astype(int)
-        x, y = np.clip(k, 0, _CELLS - 1)
-        return int(x), int(y)
+    def _cells(self, places: Array) -> list[tuple[int, int]]:
+        """Of places ``(n, 2)`` [m]; the walls round the room are cells too."""
+        inner = CELLS - 2 * _WALL
+        found = np.floor((places + self._half) / (2.0 * self._half) * inner).astype(int) + _WALL
+        return [(int(x), int(y)) for x, y in np.clip(found, 0, CELLS - 1)]
 
-    def _direction(self, item: Array) -> Array:
-        """Unit vector in which the object is to go."""
-        straight: Array = self._arena.target - item
-        if np.hypot(*straight) < 3.0 * self._half.max() / _CELLS:
-            straight /= max(float(np.hypot(*straight)), 1e-9)
-            return straight
-        move: Array = _MOVES[self._policy[self._cell(item)]]
-        unit: Array = move / float(np.hypot(*move))
-        return unit
+    def _inside(self, region: Region, places: Array) -> Mask:
+        return np.array([region.cells[c] for c in self._cells(places)])
 
     def _iterate(self) -> Array:
-        """The best of the eight moves in every cell."""
-        n = _CELLS
-        goal = self._cell(self._arena.target)
-        inner = int(math.ceil(self._reach / (2.0 * self._half[0] / n)))
-        reward = np.full((n, n), -1.0)
-        edge = np.ones((n, n), dtype=bool)
-        edge[inner:-inner, inner:-inner] = False
-        reward[edge] = -100.0
-        reward[goal] = 100.0
-        value = np.zeros((n, n))
+        """``(CELLS, CELLS, 2)`` best of eight moves, which come out with half the probability, or
+        else as one of both neighbouring ones."""
+        blocked = self._floor.blocked
+        goal = self._cells(self._arena.target[None])[0]
+        reward = np.where(blocked, _OBSTACLE, _STEP)
+        reward[goal] = _GOAL
+        value, side, n = reward.copy(), 0.5 * (1.0 - _STRAIGHT), CELLS
         for _ in range(_SWEEPS):
-            padded = np.pad(value, 1, mode="edge")
+            padded = np.pad(value, 1, constant_values=_OBSTACLE)
             after = np.array([padded[1 + a : 1 + a + n, 1 + b : 1 + b + n] for a, b in _MOVES])
-            expected = 0.5 * after + 0.25 * (np.roll(after, 1, axis=0) + np.roll(after, -1, axis=0))
-            value = reward + _DISCOUNT * expected.max(axis=0)
-            value[goal] = 100.0
-        best: Array = expected.argmax(axis=0)
-        return best
+            beside = np.roll(after, 1, axis=0) + np.roll(after, -1, axis=0)
+            expected = _STRAIGHT * after + side * beside
+            value = np.where(blocked, _OBSTACLE, _DISCOUNT * (reward + expected.max(axis=0)))
+        ways: Array = _MOVES[expected.argmax(axis=0)].astype(float)
+        return ways
+
+
+def _unit(v: Array) -> Array:
+    unit: Array = v / max(float(np.hypot(*v)), 1e-9)
+    return unit
 
 
 METHOD = open_room_method("global-input", GlobalInput)

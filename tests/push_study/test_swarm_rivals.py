@@ -11,6 +11,8 @@ from push_model import se2
 from push_model.outlines import distance, inside
 from push_scenario.bodies import load_object
 from push_study.experiments import rival_papers, swarm_rivals
+from push_study.reproductions import gibbs as paper_of_gibbs
+from push_study.reproductions import global_input as paper
 from push_study.rivals.gibbs import Gibbs, _reach
 from push_study.rivals.global_input import GlobalInput
 from push_study.rivals.occlusion import Occlusion
@@ -31,7 +33,8 @@ def test_the_global_input_is_the_same_for_all_and_regroups_a_scattered_swarm():
     assert np.ptp(u, axis=0) == pytest.approx([0.0, 0.0], abs=1e-12)
     assert np.hypot(*u[0]) == pytest.approx(0.128, rel=1e-6)
     corner = 1.5 * np.sign(wide[:, :2].mean(axis=0))
-    assert u[0] @ (corner - wide[:, :2].mean(axis=0)) > 0.0
+    way = corner - wide[:, :2].mean(axis=0)
+    assert u[0] @ way == pytest.approx(0.128 * np.hypot(*way))
     behind = np.array([-1.1, -1.1, 0.0]) + 0.02 * random.normal(size=(20, 3))
     pushed = GlobalInput(ARENA).velocities(0.0, HERE, behind)
     assert (pushed @ (TARGET - HERE[:2]) > 0.0).all()
@@ -42,10 +45,115 @@ def test_its_policy_leads_from_everywhere_to_the_target_away_from_walls():
     for start in np.random.default_rng(2).uniform(-1.2, 1.2, (50, 2)):
         at = start.copy()
         for _ in range(200):
-            at = at + 0.03 * rival._direction(at)
+            way = rival._way(at / rival._unit)
+            at = at + 0.03 * way / np.hypot(*way)
             if np.hypot(*(at - TARGET)) < 0.1:
                 break
         assert np.hypot(*(at - TARGET)) < 0.1 and np.abs(at).max() < 1.3
+
+
+def _swarm(middle, deviation: float, seed: int = 3) -> np.ndarray:
+    places = deviation * np.random.default_rng(seed).normal(size=(20, 2))
+    places = deviation * (places - places.mean(axis=0)) / places.std(axis=0)
+    return np.column_stack([np.array(middle) + places, np.zeros(20)])
+
+
+def test_the_global_input_regroups_with_hysteresis_and_drops_it_after_five_seconds():
+    """Variances in lengths of theirs: above 0.48 n r on, below 0.18 n r off; and off when the mean
+    moves."""
+    rival = GlobalInput(ARENA)
+    scale = rival._unit * math.sqrt(20 * 0.05 / rival._unit)
+    spread = {part: scale * math.sqrt(part) for part in (0.15, 0.21, 0.46, 0.5)}
+    corner = np.array([-1.5, -1.5])
+
+    def regroups(time: float, middle, part: float) -> bool:
+        u = rival.direction(time, HERE, _swarm(middle, spread[part]))
+        way = corner - middle
+        return bool(u @ way > 0.999 * np.hypot(*way))
+
+    place = np.array([-0.2, -0.9])
+    assert not regroups(0.0, place, 0.46) and regroups(0.5, place, 0.5)
+    assert regroups(1.0, place, 0.46) and regroups(1.5, place, 0.21)
+    assert not regroups(2.0, place, 0.15) and not regroups(2.5, place, 0.46)
+    assert regroups(3.0, place, 0.5)
+    assert not regroups(5.1, place + 0.1, 0.46), "it has moved"
+
+
+def test_the_global_input_goes_to_another_corner_when_the_mean_has_stopped():
+    rival, swarm = GlobalInput(ARENA), _swarm([1.2, -1.2], 0.2)
+    times = np.arange(0.0, 21.0, 0.5)
+    found = [rival.direction(t, np.zeros(3), swarm) for t in times]
+    corners = []
+    for u in found[11:]:
+        ways = np.array([[1.5, 1.5], [-1.5, 1.5], [-1.5, -1.5], [1.5, -1.5]]) - [1.2, -1.2]
+        corners.append(int((ways @ u / np.hypot(*ways.T)).argmax()))
+    assert corners[0] == 3 and set(corners) == {3, 0, 1}
+
+
+def test_the_global_input_keeps_a_direction_for_a_second():
+    rival, found = GlobalInput(ARENA), []
+    for k in range(150):
+        place = [-1.1 + 0.002 * k, -0.9]
+        found.append(rival.direction(0.02 * k, HERE, _swarm(place, 0.05)))
+    changes = np.any(np.diff(found, axis=0) != 0.0, axis=1)
+    assert changes.sum() == 2
+
+
+def test_the_global_input_leads_the_mean_round_the_object():
+    """From in front of it to behind it, without running into it, from 20 places."""
+    toward = (np.array(TARGET) - HERE[:2]) / np.hypot(*(np.array(TARGET) - HERE[:2]))
+    for angle in np.linspace(-0.4, 0.4, 20):
+        c, s = math.cos(angle), math.sin(angle)
+        mean = HERE[:2] + 0.45 * np.array(
+            [c * toward[0] - s * toward[1], s * toward[0] + c * toward[1]]
+        )
+        rival, nearest = GlobalInput(ARENA), math.inf
+        for k in range(4000):
+            mean = mean + 0.02 * 0.128 * rival.direction(0.02 * k, HERE, _swarm(mean, 0.02))
+            nearest = min(nearest, np.hypot(*(mean - HERE[:2])))
+            if (HERE[:2] - mean) @ toward > 0.9 * np.hypot(*(HERE[:2] - mean)):
+                break
+        assert k < 3999 and nearest > 0.2
+
+
+def test_only_robots_in_the_region_of_the_object_count():
+    """In the room of the paper: the object is at the bottom, most robots are at the top."""
+    law = GlobalInput(
+        OpenRoom((18.0, 18.0), paper.hexagon(), 0.15, 1.0, np.array([6.0, -7.0]), 1), paper.floor()
+    )
+    bottom, top = np.array([-5.0, 7.5]), np.array([6.0, -7.0])
+    many = np.vstack([_swarm(bottom, 0.3), _swarm(bottom, 0.3, 4), _swarm(top, 0.3)])
+    alone = GlobalInput(law._arena, paper.floor()).direction(0.0, np.array([-3, 5.5, 0]), many[:40])
+    assert law.direction(0.0, np.array([-3.0, 5.5, 0.0]), many) == pytest.approx(alone)
+    few = np.vstack([_swarm(bottom, 0.3), _swarm(top, 0.3), _swarm(top, 0.3, 4)])
+    way = np.array([9.0, 9.0]) - bottom  # where robots of all regions meet
+    told = law.direction(0.1, np.array([-3.0, 5.5, 0.0]), few)
+    assert told @ way == pytest.approx(np.hypot(*way), rel=1e-3)
+
+
+def test_the_policy_of_the_paper_leads_round_both_walls():
+    law = GlobalInput(
+        OpenRoom((18.0, 18.0), paper.hexagon(), 0.15, 1.0, np.array([6.0, -7.0]), 1), paper.floor()
+    )
+    random, cells, tried = np.random.default_rng(5), np.argwhere(~paper.floor().blocked), 0
+    for cell in random.permutation(cells)[:100]:
+        at = cell.copy()
+        for _ in range(80):
+            if np.abs(at - [16, 3]).max() < 2:
+                break
+            at = at + law._ways[tuple(at)].astype(int)
+            assert not paper.floor().blocked[tuple(at)]
+        assert np.abs(at - [16, 3]).max() < 2
+        tried += 1
+    assert tried == 100
+
+
+@pytest.mark.long
+def test_the_global_input_reaches_the_figure_of_its_authors_in_their_simulation():
+    """90 s ± 35 s in ten trials; their own code, run by us, takes 30 to 300 s."""
+    rows = [paper.run(seed) for seed in (1, 2, 3)]
+    assert rows[0] == paper.run(1)
+    assert all(r["success"] and 30.0 < r["duration_s"] < 300.0 for r in rows)
 
 
 def test_robots_push_where_the_object_hides_the_goal_and_go_along_it_elsewhere():
@@ -114,9 +222,9 @@ def test_the_random_field_keeps_off_the_outline_at_the_goal_and_does_not_see_thr
 
 
 def test_robots_of_the_paper_start_apart_from_each_other_and_from_the_object():
-    outline = se2.transform(np.array(rival_papers.START), rival_papers._OBJECT.outline)
+    outline = se2.transform(np.array(paper_of_gibbs.START), paper_of_gibbs._OBJECT.outline)
     for seed in range(50):
-        places = rival_papers.starts(np.random.default_rng(seed), 20)[:, :2]
+        places = paper_of_gibbs.starts(np.random.default_rng(seed), 20)[:, :2]
         assert not inside(outline, places).any() and distance(outline, places).min() > 0.04
         gaps = np.hypot(*(places[:, None] - places).transpose(2, 0, 1)) + np.eye(20)
         assert gaps.min() > 0.2 and np.abs(places).max() <= 1.8
@@ -126,10 +234,10 @@ def test_the_speed_of_an_object_is_that_towards_the_goal():
     """It stands for a second, goes at 1 cm/s for ten and at 5 cm/s for two, then back."""
     step = 0.2 * np.repeat([0.0, 0.01, 0.05, -0.02], [5, 50, 10, 15])
     away = 1.7 - np.concatenate([[0.0], step.cumsum()])
-    found = rival_papers.paces(away)
+    found = paper_of_gibbs.paces(away)
     assert found["pace_m_s"] == pytest.approx(0.01)
     assert found["fastest_m_s"] == pytest.approx((0.05 * 5 + 0.01 * 5) / 10)
-    assert rival_papers.paces(away[:10]) == {}
+    assert paper_of_gibbs.paces(away[:10]) == {}
 
 
 @pytest.mark.long

@@ -1,0 +1,1 @@
+"""The settings in which other authors measured their methods."""
