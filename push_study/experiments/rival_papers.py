@@ -1,8 +1,9 @@
 """Do the reconstructions of other people's methods reach the figures of their own papers?
 
 Each scenario is a setting of a paper as far as its authors published it, in text or code: the Gibbs
-random field with 2 to 20 robots in one of our worlds, and the global input with 100 robots in the
-simulation of its authors. Other settings and figures could not be read (docs/rivals.md).
+random field and occlusion with several numbers of robots in one of our worlds, and the global input
+with 100 robots in the simulation of its authors. Of occlusion, no figure could be read; other
+settings neither (docs/rivals.md).
 """
 
 import math
@@ -14,12 +15,13 @@ import numpy as np
 
 from push_model.settings import SettingsError
 from push_study.pool import Row
-from push_study.reproductions import gibbs, global_input
+from push_study.reproductions import gibbs, global_input, occlusion
 from push_study.statistics import wilson
 from push_study.study import StudyOptions
 
 GLOBAL = f"global-{global_input.ROBOTS}"
-SCENARIOS = (*gibbs.PUBLISHED, GLOBAL)
+OCCLUSION = {f"occlusion-{count}": count for count in occlusion.ROBOTS}
+SCENARIOS = (*gibbs.PUBLISHED, GLOBAL, *OCCLUSION)
 OPTIONS = {"uncertainty": "mild", "world": "planar"}
 _PACES = (
     ("first_motion_mean_s", "pace_mean_m_s", "fastest_m_s"),
@@ -29,14 +31,15 @@ _PACES = (
 
 @dataclass(frozen=True)
 class PaperTask:
-    """A run in the setting of a paper. scenario: of ``SCENARIOS``. limit: [s] of simulation."""
+    """A run in the setting of a paper. scenario: of ``SCENARIOS``. limit: [s] of simulation; None
+    for that of the setting."""
 
     scenario: str
     seed: int
     out: str
     world: str
     uncertainty: str
-    limit: float = gibbs.LIMIT
+    limit: float | None = None
 
 
 def tasks(options: StudyOptions) -> list[PaperTask]:
@@ -65,13 +68,16 @@ def tasks(options: StudyOptions) -> list[PaperTask]:
 
 
 def trial(task: PaperTask) -> Row:
-    """To the goal, or until the time is over. Rows of the Gibbs random field tell more, see its
+    """To the goal, or until the time is over. What a row tells beyond that, see the setting's
     ``run``."""
     if task.scenario == GLOBAL:
-        row = global_input.run(task.seed, task.limit)
+        row = global_input.run(task.seed, task.limit or global_input.LIMIT)
+    elif task.scenario in OCCLUSION:
+        limit, count = task.limit or occlusion.LIMIT, OCCLUSION[task.scenario]
+        row = occlusion.run(count, task.seed, task.world, task.uncertainty, limit)
     else:
-        count = int(task.scenario.split("-")[1])
-        row = gibbs.run(count, task.seed, task.world, task.uncertainty, task.limit)
+        limit, count = task.limit or gibbs.LIMIT, int(task.scenario.split("-")[1])
+        row = gibbs.run(count, task.seed, task.world, task.uncertainty, limit)
     return {"scenario": task.scenario, "seed": task.seed, **row}
 
 
@@ -92,7 +98,18 @@ def statistics(rows: list[Row]) -> dict[str, Any]:
         }
         if name == GLOBAL:
             mean, std = global_input.PUBLISHED
-            found[name] |= {"published_mean_s": mean, "published_std_s": std}
+            theirs_too = [t for t in global_input.THEIR_CODE if math.isfinite(t)]
+            found[name] |= {
+                "published_mean_s": mean,
+                "published_std_s": std,
+                "time_median_s": float(np.median(times)) if times else math.nan,
+                "their_code_reached": len(theirs_too),
+                "their_code_of": len(global_input.THEIR_CODE),
+                "their_code_median_s": float(np.median(theirs_too)),
+                "their_code_mean_s": _mean(theirs_too),
+                "their_code_std_s": float(np.std(theirs_too)),
+            }
+        if name not in gibbs.PUBLISHED:
             continue
         theirs, moved = gibbs.PUBLISHED[name], [r for r in mine if "pace_m_s" in r]
         found[name] |= {
@@ -113,14 +130,21 @@ def _mean(values: Sequence[float]) -> float:
 
 
 def conclude(options: StudyOptions, tasks: Sequence[PaperTask], rows: list[Row]) -> None:
-    """Two lines for each setting: ours, and what was published."""
+    """For each setting, what is reached here and what was published."""
     print("\nsetting               reached     time [s]  first motion [s]  median, greatest [cm/s]")
     for name, s in statistics(rows).items():
         ours = s["time_mean_s"], s["time_std_s"]
-        published = s["published_mean_s"], s["published_std_s"]
-        here, there = _PACES if name != GLOBAL else ((), ())
+        here, there = _PACES if name in gibbs.PUBLISHED else ((), ())
         print(_line(f"{name}, ours", s["reached"], s["of"], ours, [s[k] for k in here]))
-        print(_line(f"{name}, published", 10, 10, published, [s[k] for k in there]))
+        if "published_mean_s" in s:
+            published = s["published_mean_s"], s["published_std_s"]
+            print(_line(f"{name}, published", 10, 10, published, [s[k] for k in there]))
+            if "their_code_of" in s:
+                theirs = s["their_code_mean_s"], s["their_code_std_s"]
+                reached, of = s["their_code_reached"], s["their_code_of"]
+                print(_line(f"{name}, their code", reached, of, theirs, ()))
+        else:
+            print(f"{name}, published: in a diagram, without numbers")
 
 
 def _line(

@@ -10,6 +10,7 @@ from push_study.leaderboard.entry import (
     POSES,
     POSITIONS,
     Entry,
+    Reproduction,
     Told,
     entry_from_outside,
 )
@@ -48,6 +49,13 @@ ENTRIES = (
         "Shahrokhi et al., T-RO 2018",
         robot="disc",
         reconstructed=True,
+        reproduction=Reproduction(
+            "90 ± 35 s with 100 robots, ten trials; the authors' code, run by us: 58 of 60 trials "
+            "reached, median 69 s",
+            "38 of 40 trials reached, median 74 s",
+            True,
+            "planar-push experiment rival-papers --scenarios global-100 --trials 40",
+        ),
     ),
     Entry(
         "occlusion",
@@ -64,6 +72,12 @@ ENTRIES = (
         frozenset({POSITIONS}),
         "Rezeck et al., 2021",
         reconstructed=True,
+        reproduction=Reproduction(
+            "259 ± 16 s with 20 robots, ten trials",
+            "141 ± 77 s, ten trials",
+            False,
+            "planar-push experiment rival-papers --scenarios gibbs-20 --trials 10",
+        ),
     ),
     Entry("one robot", "one-robot", _ALL, frozenset({POSES})),
     Entry(
@@ -80,6 +94,14 @@ ENTRIES = (
         _ALL,
         frozenset({POSES}),
         "Tang et al., RA-L 2023",
+        reconstructed=True,
+    ),
+    Entry(
+        "Dubins push",
+        "dubins-push",
+        _ALL,
+        frozenset({POSES}),
+        "ReloPush for one object; Ahn and Mavrogiannis 2024",
         reconstructed=True,
     ),
     Entry("reactive pusher", "reactive", _ALL, frozenset({POSES}), "this project, a baseline"),

@@ -15,38 +15,35 @@ Bodies that are not on the map are not avoided in a push.
 """
 
 import math
-from collections.abc import Mapping
-from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from push_job.method import Arena, MethodSpec, Seen, Task
-from push_job.report import Figure, Report, Status, polyline
+from push_job.report import Figure, Report, polyline
 from push_model import se2
 from push_model.arrays import Array
 from push_model.belief import Belief
-from push_model.jobs import JobError
 from push_model.pushable_sides import pushable_sides
 from push_model.settings import bounded, settings
 from push_model.specs import RobotSpec
 from push_model.stable_push import contact_on_side
 from push_planner.guide_path import lattice_path
-from push_study.rivals.lone_pusher import STILL, GoalTolerances, LonePusher
+from push_study.rivals.repeated_pusher import (
+    ACCELERATION,
+    CREEP,
+    RepeatedPusher,
+    RepeatedSettings,
+)
 from push_study.rivals.side_contact import SECTIONS, check_team
 
-_LOST = 0.3  # [s] in doubt until contact counts as lost
-_ACCELERATION, _CREEP = 0.3, 5e-3  # [m/s^2]; [m/s] of the end of a push
-_WATCH, _STUCK = 1.0, 0.3  # [s]; of the commanded way, less than which the object moves in it
 _CLEARANCES = (0.1, 0.07, 0.05)  # [m] of the object's way on the map, the first that leads there
 _BEYOND = 0.3  # [m] of straight path that is aimed at beyond the goal
 
 
 @settings
-class ReactiveSettings(GoalTolerances):
+class ReactiveSettings(RepeatedSettings):
     """Tolerances, and how the object is steered."""
 
-    push_speed: float = bounded(0.125, low=1e-3, high=1.0, doc="Speed of a push (m/s).")
     look_ahead: float = bounded(
         0.15,
         low=0.01,
@@ -60,49 +57,31 @@ class ReactiveSettings(GoalTolerances):
     runway: float = bounded(
         0.4, low=0.0, high=5.0, doc="Length of the straight end of the object's path (m)."
     )
-    attempts: int = bounded(6, low=1, high=1000, doc="Number of pushes after which the job fails.")
 
 
-class ReactivePusher(LonePusher):
+class ReactivePusher(RepeatedPusher):
     """Drives to a side, touches it, and steers until the object is beside the goal."""
 
     def __init__(self, arena: Arena) -> None:
         self._own: ReactiveSettings = arena.section("", ReactiveSettings)
         super().__init__(arena, "reactive", self._own)
-        self._path, self._pushes = np.zeros((0, 2)), 0
-
-    @property
-    def status(self) -> Status:
-        """See Method."""
-        return replace(super().status, pushes=self._pushes)
+        self._path = np.zeros((0, 2))
 
     def begin(self, task: Task, belief: Belief) -> None:
         """See Method."""
         super().begin(task, belief)
-        self._path, self._pushes, self._backed = np.zeros((0, 2)), 0, False
+        self._path = np.zeros((0, 2))
 
-    def _look(self, robot: Array, seen: Array, belief: Belief) -> None:
-        """Choose a side and a path, and set out."""
-        spec, near = belief.robot(self._name), self._side.near
-        item = self._item.mass_pose(seen)
-        near.believe(spec, self._item)
-        missed = self._off(item)
-        if not missed:
-            self.end(JobError.NONE, "at the goal")
-        elif self._pushes >= self._own.attempts:
-            text = f"the object is {missed} after {self._pushes} pushes"
-            self.end(JobError.OFF_TARGET, text)
-        elif near.touching(robot, seen) and not self._backed:
-            self._backed = True  # once: there may be no room
-            self._back_off(robot, seen)
-        else:
-            blocked = "no way of the object leads to the goal"
-            for _, grasp, path in sorted(self._offers(item, spec), key=lambda o: o[0]):
-                blocked = self._set_out(robot, seen, grasp, belief, "a side")
-                if not blocked:
-                    self._path = path
-                    return
-            self.end(JobError.PLANNING_FAILED, blocked)
+    def _choose(self, robot: Array, seen: Array, belief: Belief, spec: RobotSpec) -> str:
+        """A side and a path."""
+        blocked = "no way of the object leads to the goal"
+        offers = self._offers(self._item.mass_pose(seen), spec)
+        for _, grasp, path in sorted(offers, key=lambda o: o[0]):
+            blocked = self._set_out(robot, seen, grasp, belief, "a side")
+            if not blocked:
+                self._path = path
+                return ""
+        return blocked
 
     def _offers(self, item: Array, spec: RobotSpec) -> list[tuple[float, Array, Array]]:
         """For each side: the length of its path with its turns, the grasp, and the path ``(n, 2)``
@@ -132,33 +111,11 @@ class ReactivePusher(LonePusher):
         return next((w for w in ways if w is not None), None)
 
     def _touched(self, item: Array) -> None:
-        self._pushes += 1
-        self._over = self._gone = 0.0
-        self._watched, self._since, self._asked = item[:2].copy(), 0.0, 0.0
-        self._stuck = self._backed = False
+        super()._touched(item)
+        self._gone = 0.0
 
-    def _push(self, dt: float, now: Array, item: Array, lost: Array) -> tuple[float, float]:
-        v, omega = self._steered(se2.compose(now, self._measured), float(now[2]))
-        self._watch(dt, item)
-        if self._doubt > _LOST or self._stuck or v <= 0.0:
-            self._over += dt
-            if self._over > STILL:
-                self._look_again()
-            return 0.0, 0.0
-        slower = min(1.0, (self._in_force[0] + _ACCELERATION * dt) / v)
-        return self._arena.robot.differential.saturate(slower * v, slower * omega)
-
-    def _watch(self, dt: float, item: Array) -> None:
-        """Whether something holds robot and object fast."""
-        self._since, self._asked = self._since + dt, self._asked + dt * self._in_force[0]
-        if self._since >= _WATCH:
-            moved = float(np.hypot(*(item[:2] - self._watched)))
-            self._stuck = self._stuck or moved < _STUCK * self._asked
-            self._watched, self._since, self._asked = item[:2].copy(), 0.0, 0.0
-
-    def _steered(self, item: Array, heading: float) -> tuple[float, float]:
-        """Speed [m/s] and turn rate [rad/s] for the object's centre of mass at ``(3,)``; no speed
-        once it is past the goal."""
+    def _steered(self, now: Array, item: Array) -> tuple[float, float]:
+        """Towards a point of the path; no speed once the object is past the goal."""
         s, path = self._own, self._path
         legs = np.diff(path, axis=0)
         lengths = np.maximum(np.hypot(*legs.T), 1e-9)
@@ -181,21 +138,17 @@ class ReactivePusher(LonePusher):
         leg = min(int(np.searchsorted(before, way, side="right")) - 1, len(legs) - 1)
         aim = path[leg] + (way - before[leg]) / lengths[leg] * legs[leg]
         x, y = aim - item[:2]
-        turn = float(np.clip(se2.wrap(math.atan2(y, x) - heading), -1.4, 1.4))
+        turn = float(np.clip(se2.wrap(math.atan2(y, x) - float(now[2])), -1.4, 1.4))
         bend = math.tan(turn) / float(self._grasp[0])
         bend = max(-s.bend, min(s.bend, bend))
         remaining = max(end - self._gone, 0.0)
-        v = min(s.push_speed, math.sqrt(2.0 * _ACCELERATION * remaining) + _CREEP)
+        v = min(s.push_speed, math.sqrt(2.0 * ACCELERATION * remaining) + CREEP)
         return v, v * bend
 
     def report(self, seen: Seen) -> Report | None:
         """See Method."""
         shapes = (polyline("path", self._path),) if len(self._path) else ()
         return self._told_of(seen, Figure("pushes", float(self._pushes)), shapes)
-
-    def facts(self) -> Mapping[str, Any]:
-        """See Method."""
-        return {"pushes": self._pushes}
 
 
 METHOD = MethodSpec(

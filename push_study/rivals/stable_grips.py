@@ -1,4 +1,4 @@
-"""Sides from which an object can be pushed without slipping, for ``stable_nmpc.py``; settings."""
+"""Sides from which an object can be pushed without slipping, and settings of ``stable_nmpc.py``."""
 
 from dataclasses import dataclass
 
@@ -40,11 +40,11 @@ class Grip:
     limits: CurvatureLimits
 
 
-def grips(own: StableNmpcSettings, belief: Belief, robot: RobotSpec, name: str) -> tuple[Grip, ...]:
+def grips(friction_trust: float, belief: Belief, robot: RobotSpec, name: str) -> tuple[Grip, ...]:
     """Of all sides of an object that can be pushed without slipping, as far as is believed."""
     item, found = belief.object(name), []
     friction = belief.interval(name, "contact_friction")
-    mu = min(own.friction_trust * friction.value, friction.low)
+    mu = min(friction_trust * friction.value, friction.low)
     for side in pushable_sides(item.geometry, robot):
         contact = contact_on_side(side, robot.flat_bumper.width)
         limits = curvature_limits(contact, robot.push_distance, mu, item.limit_surface())

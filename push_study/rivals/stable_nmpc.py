@@ -96,7 +96,7 @@ class StableNmpcMethod(LonePusher):
         begins, goal = [], self._item.mass_pose(self._goal)
         ways = (lattice_path(self._side.field, item, goal, c) for c in _CLEARANCES)
         guide = next((w for w in ways if w is not None), None)
-        for grip in grips(self._own, belief, spec, self._arena.object):
+        for grip in grips(self._own.friction_trust, belief, spec, self._arena.object):
             robot, last = (se2.compose(p, se2.inverse(grip.grasp)) for p in (item, goal))
             for points in (guide, cubic(item, goal, grip.grasp[2])):
                 if points is not None:

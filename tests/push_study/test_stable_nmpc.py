@@ -46,6 +46,9 @@ def arena():
     return Arena(rasterise(ROOM), {"e0": ROBOT}, OBJECT, BOX)
 
 
+TRUST = StableNmpcSettings().friction_trust
+
+
 def margins(grip, curvature, friction):
     """Of the mechanics, see ``contact_margins``."""
     d, half = ROBOT.push_distance, 0.5 * ROBOT.flat_bumper.width
@@ -57,7 +60,7 @@ def margins(grip, curvature, friction):
 @pytest.mark.parametrize("trust", [0.5, 0.85, 1.0])
 def test_the_constraint_is_that_of_the_mechanics(trust):
     """On the limits the object just sticks with so much of the believed friction."""
-    found = grips(StableNmpcSettings(friction_trust=trust), BELIEF, ROBOT, OBJECT)
+    found = grips(trust, BELIEF, ROBOT, OBJECT)
     assert len(found) == 4
     for grip in found:
         friction = trust * BOX.contact_friction
@@ -71,14 +74,12 @@ def test_the_constraint_is_that_of_the_mechanics(trust):
 
 def test_less_friction_that_is_believed_is_what_counts():
     less = BELIEF.updated({(OBJECT, "contact_friction"): Interval(0.2, 0.1, 0.4)})
-    (known, *_), (doubted, *_) = (
-        grips(StableNmpcSettings(), b, ROBOT, OBJECT) for b in (BELIEF, less)
-    )
+    (known, *_), (doubted, *_) = (grips(TRUST, b, ROBOT, OBJECT) for b in (BELIEF, less))
     assert doubted.limits.maximum == pytest.approx(known.limits.maximum * 0.1 / 0.17)
 
 
 def test_a_plan_keeps_its_constraints_and_ends_at_the_goal(programme):
-    grip = grips(StableNmpcSettings(), BELIEF, ROBOT, OBJECT)[0]
+    grip = grips(TRUST, BELIEF, ROBOT, OBJECT)[0]
     item, goal = np.array([-0.45, -0.2, 0.0]), np.array([0.5, 0.15, 0.3])
     robot, last = (se2.compose(p, se2.inverse(grip.grasp)) for p in (item, goal))
     z, _ = programme.along(cubic(item, goal, 0.0), robot, grip.grasp)
@@ -103,7 +104,7 @@ def test_a_plan_keeps_off_what_is_on_the_map():
     """A wall in the straight way: the object goes round its end, at least by the margin."""
     room = EnvironmentSpec((2.4, 1.6), boxes=(BoxSpec((0.0, -0.4), (0.1, 0.8)),))
     grid = rasterise(room)
-    grip = grips(StableNmpcSettings(), BELIEF, ROBOT, OBJECT)[0]
+    grip = grips(TRUST, BELIEF, ROBOT, OBJECT)[0]
     item, goal = np.array([-0.9, -0.1, 0.0]), np.array([0.9, -0.1, 0.0])
     robot, last = (se2.compose(p, se2.inverse(grip.grasp)) for p in (item, goal))
     made = StableProgramme(grid, ROBOT, BOX)

@@ -9,10 +9,12 @@ import pytest
 from push_job.open_room import OpenRoom
 from push_model import se2
 from push_model.outlines import distance, inside
+from push_model.settings import SettingsError
 from push_scenario.bodies import load_object
 from push_study.experiments import rival_papers, swarm_rivals
 from push_study.reproductions import gibbs as paper_of_gibbs
 from push_study.reproductions import global_input as paper
+from push_study.reproductions import occlusion as paper_of_occlusion
 from push_study.rivals.gibbs import Gibbs, _reach
 from push_study.rivals.global_input import GlobalInput
 from push_study.rivals.occlusion import Occlusion
@@ -228,6 +230,34 @@ def test_robots_of_the_paper_start_apart_from_each_other_and_from_the_object():
         assert not inside(outline, places).any() and distance(outline, places).min() > 0.04
         gaps = np.hypot(*(places[:, None] - places).transpose(2, 0, 1)) + np.eye(20)
         assert gaps.min() > 0.2 and np.abs(places).max() <= 1.8
+
+
+def test_robots_of_the_other_paper_start_apart_from_each_other_the_object_and_the_goal():
+    for seed in range(50):
+        places = paper_of_occlusion.starts(np.random.default_rng(seed), 20)[:, :2]
+        gaps = np.hypot(*(places[:, None] - places).transpose(2, 0, 1)) + np.eye(20)
+        assert gaps.min() >= 0.12 and np.abs(places).max() < 1.41
+        assert np.hypot(*(places - [1.0, 1.0]).T).min() >= 0.28
+        assert np.hypot(*(places + [1.0, 1.0]).T).min() >= 0.36
+    assert pytest.approx(0.533, abs=5e-4) == paper_of_occlusion.REACHED
+
+
+@pytest.mark.long
+def test_equal_seeds_give_equal_runs_in_the_setting_of_the_other_paper(tmp_path, capsys):
+    task = rival_papers.PaperTask("occlusion-20", 3, str(tmp_path), "planar", "mild", 20.0)
+    rows = [rival_papers.trial(task) for _ in range(2)]
+    assert rows[0] == rows[1] and rows[0]["nearest_m"] < 2.5
+    rival_papers.conclude(StudyOptions(("occlusion-20",), 2, 1, tmp_path), [task], rows)
+    assert "of 2 " in capsys.readouterr().out
+
+
+def test_a_study_with_a_simulation_of_its_own_refuses_the_options_of_ours(tmp_path):
+    for name in ("world", "uncertainty"):
+        options = StudyOptions(("global-100",), 1, 1, tmp_path, asked=frozenset({name}))
+        with pytest.raises(SettingsError, match=f"--{name}"):
+            rival_papers.tasks(options)
+        mixed = replace(options, scenarios=("global-100", "gibbs-2"))
+        assert [t.scenario for t in rival_papers.tasks(mixed)] == ["global-100", "gibbs-2"]
 
 
 def test_the_speed_of_an_object_is_that_towards_the_goal():

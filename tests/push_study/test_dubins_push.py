@@ -1,0 +1,165 @@
+"""Dubins pushes: their paths, where they get to, and when there is none."""
+
+import math
+
+import numpy as np
+import pytest
+
+from push_job.method import Arena, Refusal, Seen, Task
+from push_model import se2
+from push_model.belief import Belief
+from push_model.jobs import JobError, JobPhase
+from push_model.occupancy import rasterise
+from push_model.settings import SettingsError
+from push_model.specs import BoxSpec, EnvironmentSpec
+from push_scenario.bodies import load_object, load_robot
+from push_study.rivals.dubins_push import METHOD, DubinsPusher, DubinsSettings, dubins
+from push_study.rivals.stable_grips import grips
+from push_study.team_run import OBJECT, made_scenario, run_team
+from push_study.uncertainty import uncertainty
+from sim_bridge.planar_world import PlanarWorld
+from tests.samples import mostly_long
+
+ROBOT, BOX = load_robot("epuck"), load_object("box9")
+ROOM = EnvironmentSpec((3.0, 2.4))
+BELIEF = Belief({OBJECT: BOX}, {"e0": ROBOT})
+START = np.array([-0.8, 0.0, 0.0])
+AHEAD = Task((np.array([0.5, 0.1, 0.2]),))
+
+
+def seen_at(time, item, robot):
+    return Seen(time, item, {"e0": robot})
+
+
+HERE = seen_at(0.0, START, np.array([-1.1, 0.0, 0.0]))
+
+
+def arena(room=ROOM, **settings):
+    own = {"": DubinsSettings(**settings)}
+    return Arena(rasterise(room), {"e0": ROBOT}, OBJECT, BOX, own)
+
+
+def run(goal, start=START, room=ROOM, limit=150.0, **settings):
+    """A task in the planar world, frame by frame, with exact poses: status, pose of the object."""
+    method = DubinsPusher(arena(room, **settings))
+    method.begin(Task((np.array(goal),)), BELIEF)
+    behind = se2.compose(start, np.array([-0.25, 0.0, 0.0]))
+    world = PlanarWorld(room, {"e0": (ROBOT, behind)}, {OBJECT: (BOX, start)})
+    time = 0.0
+    while method.status.phase != JobPhase.IDLE and time < limit:
+        time += 0.01
+        found = world.poses()
+        told = method.step(seen_at(time, found[OBJECT], found["e0"]), BELIEF)
+        world.command("e0", *told.commands.get("e0", (0.0, 0.0)))
+        world.step(round(0.01 / world.time_step))
+    return method.status, world.poses()[OBJECT]
+
+
+def test_paths_join_their_ends_with_bends_that_are_allowed():
+    """200 random pairs of poses."""
+    random = np.random.default_rng(1)
+    for _ in range(200):
+        start, goal = random.uniform([-1, -1, -3], [1, 1, 3], (2, 3))
+        radius = random.uniform(0.1, 1.0)
+        path, length = dubins(start, goal, radius)
+        for pose, end in ((path[0], start), (path[-1], goal)):
+            off = se2.between(end, pose)
+            assert np.abs([off[0], off[1], se2.wrap(off[2])]) == pytest.approx(0.0, abs=1e-6)
+        steps = np.hypot(*np.diff(path[:, :2], axis=0).T)
+        turns = np.abs([se2.wrap(t) for t in np.diff(path[:, 2])])
+        assert steps.max() <= 0.0101 and steps.sum() == pytest.approx(length, rel=1e-3)
+        assert (turns <= (0.01 + 1e-6) / radius).all()
+
+
+@pytest.mark.parametrize("seed", mostly_long(range(40), 4))
+def test_goals_in_an_open_room_are_reached(seed):
+    """Any heading: where no path fits into the room, after a straight push."""
+    random = np.random.default_rng(seed)
+    goal = random.uniform([-0.9, -0.6, -math.pi], [0.9, 0.6, math.pi])
+    status, item = run(goal)
+    off = se2.between(goal, item)
+    assert status.phase == JobPhase.IDLE and status.pushes >= 1
+    assert status.code == JobError.NONE, status.reason
+    assert np.hypot(*off[:2]) <= 0.02 and abs(se2.wrap(off[2])) <= 0.1
+
+
+def test_paths_keep_clear_of_the_map_and_the_bends_are_stable():
+    """Of 10 random goals beside a wall with an end."""
+    room = EnvironmentSpec((3.0, 2.4), boxes=(BoxSpec((0.0, -0.5), (0.1, 1.4)),))
+    method, random, found = DubinsPusher(arena(room)), np.random.default_rng(3), 0
+    field = method._side.field
+    for _ in range(10):
+        goal = random.uniform([0.4, -0.8, -1.5], [1.2, 0.8, 1.5])
+        method.begin(Task((goal,)), BELIEF)
+        sides = grips(0.85, BELIEF, ROBOT, OBJECT)
+        item = BOX.mass_pose(START)
+        plans = [*method._direct(item, sides, ROBOT), *method._relocating(item, sides, ROBOT)]
+        for _, grip, path in plans:
+            found += 1
+            items = np.array([se2.compose(p, grip.grasp) for p in path])
+            assert field.clearances(BOX.geometry.outline, items).min() >= 0.01
+            bends = [se2.wrap(t) for t in np.diff(path[:, 2])]
+            bends = np.array(bends) / np.hypot(*np.diff(path[:, :2], axis=0).T)
+            assert bends.max() <= grip.limits.maximum * 1.01
+            assert bends.min() >= grip.limits.minimum * 1.01
+    assert found > 20
+
+
+def test_a_goal_behind_a_wall_has_no_path_and_the_job_says_so():
+    room = EnvironmentSpec((3.0, 2.4), boxes=(BoxSpec((0.0, 0.0), (0.1, 2.4)),))
+    status, item = run([0.8, 0.0, 0.0], room=room)
+    assert status.code == JobError.PLANNING_FAILED and "no Dubins path is clear" in status.reason
+    assert item == pytest.approx(START)
+
+
+def test_where_no_path_is_clear_the_object_is_first_pushed_straight_on():
+    goal = [-0.8, 0.9, 1.57]
+    method = DubinsPusher(arena())
+    method.begin(Task((np.array(goal),)), BELIEF)
+    sides = grips(0.85, BELIEF, ROBOT, OBJECT)
+    assert not list(method._direct(BOX.mass_pose(START), sides, ROBOT))
+    status, item = run(goal)
+    assert status.code == JobError.NONE and status.pushes == 2
+    assert np.hypot(*(item[:2] - goal[:2])) <= 0.02
+    status, _ = run(goal, attempts=1)
+    assert status.code == JobError.OFF_TARGET and "after 1 pushes" in status.reason
+
+
+@pytest.mark.parametrize(
+    ("task", "words"),
+    [
+        (Task((np.array([0.3, 0.0, np.nan]),)), "needs a heading"),
+        (Task(AHEAD.targets, (10.0,)), "a single goal, without times"),
+    ],
+)
+def test_what_it_cannot_do_is_refused_with_the_reason(task, words):
+    refused = METHOD.make(arena()).assess(task, BELIEF, HERE)
+    assert isinstance(refused, Refusal) and refused.code is JobError.INVALID_GOAL
+    assert words in refused.reason
+
+
+def test_teams_it_cannot_drive_are_refused():
+    with pytest.raises(SettingsError, match="method 'dubins-push' takes one"):
+        METHOD.check({"e0": ROBOT, "e1": ROBOT}, BOX)
+    with pytest.raises(SettingsError, match="flat bumper"):
+        METHOD.check({"e0": load_robot("epuck_ring")}, BOX)
+
+
+def test_a_robot_that_is_not_seen_stands_and_then_ends_the_task():
+    method = DubinsPusher(arena())
+    method.begin(AHEAD, BELIEF)
+    method.step(HERE, BELIEF)
+    told = [method.step(Seen(0.01 * k, START, {}), BELIEF) for k in range(1, 600)]
+    assert not any(t.commands for t in told)
+    assert method.status.code == JobError.POSES_STALE
+
+
+@pytest.mark.long
+def test_a_match_in_lockstep_is_equal_to_the_bit_with_equal_seeds():
+    starts = np.array([HERE.robots["e0"]])
+    believed = made_scenario("ahead", ROOM, ROBOT, starts, BOX, START)
+    system = "push_study.rivals.dubins_push:METHOD"
+    found = [run_team(system, believed, AHEAD, uncertainty("mild"), 3, 60.0) for _ in range(2)]
+    assert all(o.success and o.error[0] < 0.02 and o.error[1] < 0.1 for o in found)
+    first, second = (np.array(o.trace.ways) for o in found)
+    assert np.array_equal(first, second)
