@@ -73,7 +73,7 @@ def run() -> dict[str, Any]:
         delays: dict[str, list[np.ndarray]] = {name: [] for name in ("alone", *beside)}
         for count in range(_ROUNDS):
             print(f"  round {count + 1} of {_ROUNDS}", flush=True)
-            delays["alone"].append(course.follow(_SECONDS))
+            delays["alone"].append(course.measure())
             for name, commands in beside.items():
                 delays[name].append(_beside(port, commands, course))
         rows = {name: _summary(name, rounds) for name, rounds in delays.items()}
@@ -132,8 +132,13 @@ class _Course:
             following += 0.01
             while time.perf_counter() < following:
                 self.spinner.once(max(0.0005, following - time.perf_counter()))
-        self.unanswered += len(self.sent)
         return np.array(self.delays[50:])
+
+    def measure(self) -> np.ndarray:
+        """Delays [s] of a round; counts what is not answered."""
+        delays = self.follow(_SECONDS)
+        self.unanswered += len(self.sent)
+        return delays
 
 
 def _free_port() -> int:
@@ -186,7 +191,7 @@ def _beside(port: int, commands: Sequence[list[str]], course: _Course) -> np.nda
             )
             stack.callback(_end, process)
         course.follow(_LOADING)
-        delays = course.follow(_SECONDS)
+        delays = course.measure()
         if _connections(port) < len(commands):
             raise RuntimeError("no page was open")
         return delays

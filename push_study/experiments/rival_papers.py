@@ -22,7 +22,7 @@ from push_study.study import StudyOptions
 GLOBAL = f"global-{global_input.ROBOTS}"
 OCCLUSION = {f"occlusion-{count}": count for count in occlusion.ROBOTS}
 SCENARIOS = (*gibbs.PUBLISHED, GLOBAL, *OCCLUSION)
-OPTIONS = {"uncertainty": "mild", "world": "planar"}
+OPTIONS = {"uncertainty": "mild", "world": "planar"}  # of all but GLOBAL
 _PACES = (
     ("first_motion_mean_s", "pace_mean_m_s", "fastest_m_s"),
     ("published_first_motion_s", "published_pace_m_s", "published_fastest_m_s"),

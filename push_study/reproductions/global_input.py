@@ -1,10 +1,12 @@
 """The global input of Shahrokhi et al. in the setting of its authors: a room with two walls, a
 hundred discs and a hexagon, in their physics.
 
-Everything is as in the code that they published (aabecker/SwarmControlSandbox, January 2017,
-``ObjectManipulation_Complete_Polished``): lengths, densities, frictions, restitutions, drag, noise,
-places and the goal. Bodies move without friction on the floor, and against a drag. Their engine is
-Box2D; here it is pymunk, which has the same laws of contact but solves them in another way.
+Lengths, densities, frictions, restitutions, drag, noise, places and the goal are as in the code
+that they published (aabecker/SwarmControlSandbox, January 2017,
+``ObjectManipulation_Complete_Polished``). Bodies move without friction on the floor, and against a
+drag. Their engine is Box2D; here it is pymunk, which solves contacts in another way, and in which
+slow bodies bounce too. The mean velocity that slows the robots is that of all of them; their code
+takes as many robots as are in the object's region.
 """
 
 import math
@@ -42,7 +44,9 @@ _DENSITY, _HEAVY = 10.0, 6.0  # of robots, of the object
 _FORCE, _SLOWED, _NOISE = 10.0, 1.0, 5.0  # of the input, less so much times the mean velocity
 _DRAG = 1.0  # [1/s]
 _RUBS = {"robot": 2.0, "object": 0.8, "wall": 0.5}  # two of them: the root of their product
-_BOUNCE = {"robot": 0.5**0.5, "object": 0.5**0.5, "wall": 0.5**0.5}  # two of them: their product
+_BOUNCE, _OBJECT_AT_WALL = 0.5**0.5, 0.25  # two shapes: their product; of these two
+_SLOP = 0.005  # bodies overlap so much
+_KINDS = {"robot": 1, "object": 2, "wall": 3}
 _WALLS = ((5.0, 6.0, 20.0, 7.0), (0.0, 13.0333, 15.0, 14.0333))  # x0, y0, x1, y1
 _OUTER = (
     (-9.0, 19.0, 29.0, 23.0),
@@ -102,6 +106,9 @@ class Room:
         self._random = np.random.default_rng(seed)
         self._space = space = pymunk.Space()
         space.damping, space.iterations = math.exp(-_DRAG), 10
+        space.collision_slop = _SLOP
+        hits = space.add_collision_handler(_KINDS["object"], _KINDS["wall"])
+        hits.pre_solve = _bounces_less
         for x0, y0, x1, y1 in (*_WALLS, *_OUTER):
             corners = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
             space.add(self._rubs(pymunk.Poly(space.static_body, corners), "wall"))
@@ -123,7 +130,8 @@ class Room:
 
     @staticmethod
     def _rubs(shape: Any, kind: str) -> Any:
-        shape.friction, shape.elasticity = _RUBS[kind] ** 0.5, _BOUNCE[kind]
+        shape.friction, shape.elasticity = _RUBS[kind] ** 0.5, _BOUNCE
+        shape.collision_type = _KINDS[kind]
         return shape
 
     @property
@@ -146,6 +154,11 @@ class Room:
         for robot, (x, y) in zip(self._robots, force + noise, strict=True):
             robot.apply_force_at_world_point((float(x), float(y)), robot.position)
         self._space.step(_STEP)
+
+
+def _bounces_less(arbiter: Any, space: Any, data: Any) -> bool:
+    arbiter.restitution = _OBJECT_AT_WALL
+    return True
 
 
 def hexagon() -> ObjectSpec:

@@ -3,8 +3,8 @@
 Room, goal, places, robots' size and speed, when the goal counts as reached and the limit are those
 of the experiments in their code (brenocq/object-transportation, controller ``PusherPaperScript``,
 map ``reference``, object ``square``). The world is one of ours: object and floor obey Coulomb's
-law, and how heavy the object is for a robot is not known of theirs. Their results are in a diagram,
-without numbers.
+law, and one robot can push the object. Of theirs, masses are known (5 kg and 0.3 kg), but not what
+resists the object. Their results are in a diagram, without numbers.
 """
 
 import math

@@ -26,7 +26,7 @@ from collections.abc import Iterator
 import numpy as np
 from ompl import base
 
-from push_job.method import Arena, MethodSpec, Seen
+from push_job.method import Arena, MethodSpec, Seen, Task
 from push_job.report import Figure, Report, polyline
 from push_model import se2
 from push_model.arrays import Array
@@ -43,11 +43,9 @@ from push_study.rivals.side_contact import SECTIONS, check_team
 from push_study.rivals.stable_grips import Grip, grips
 
 _EVERY, _RELOCATED = 0.01, 0.1  # [m] between poses of a path, and between places tried
-_FARTHEST = 3.0  # [m] that an object is relocated
-_CLEAR = 0.01  # [m] that object and robot keep from obstacles of the map
+_FARTHEST, _LONGEST = 3.0, 20.0  # [m] that an object is relocated; of a path
+_CLEAR = 0.01  # [m] from obstacles of the map, if there is so much where a push begins
 _WITHIN = 0.12  # [m] of a path in which a robot comes back to it
-_ROUND = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
-_BODY = np.column_stack([np.cos(_ROUND), np.sin(_ROUND)])  # of a radius of 1
 
 
 @settings
@@ -71,20 +69,25 @@ class DubinsPusher(RepeatedPusher):
         super().__init__(arena, "dubins-push", self._own)
         self._path = np.zeros((0, 3))
 
+    def begin(self, task: Task, belief: Belief) -> None:
+        """See Method."""
+        super().begin(task, belief)
+        self._path = np.zeros((0, 3))
+
     def _choose(self, robot: Array, seen: Array, belief: Belief, spec: RobotSpec) -> str:
         """The shortest plan whose first side can be reached."""
         found = grips(self._own.friction_trust, belief, spec, self._arena.object)
         if not found:
             return "no side of the object can be pushed without slipping"
         item = self._item.mass_pose(seen)
-        plans = sorted(self._direct(item, found, spec), key=lambda p: p[0])
-        plans = plans or sorted(self._relocating(item, found, spec), key=lambda p: p[0])
         blocked = "no Dubins path is clear, also after a straight push"
-        for _, grip, path in plans:
-            blocked = self._set_out(robot, seen, grip.grasp, belief, f"side {grip.side.index}")
-            if not blocked:
-                self._grip, self._path = grip, path
-                return ""
+        for offers in (self._direct, self._relocating):
+            for _, grip, path in sorted(offers(item, found, spec), key=lambda p: p[0]):
+                to = f"side {grip.side.index}"
+                blocked = self._set_out(robot, seen, grip.grasp, belief, to)
+                if not blocked:
+                    self._grip, self._path = grip, path
+                    return ""
         return blocked
 
     def _direct(
@@ -95,7 +98,7 @@ class DubinsPusher(RepeatedPusher):
         for grip in found:
             back = se2.inverse(grip.grasp)
             path, length = dubins(se2.compose(item, back), se2.compose(goal, back), _radius(grip))
-            if self._clear(path, grip, spec):
+            if length <= _LONGEST and self._clear(path, grip, spec):
                 yield length, grip, path
 
     def _relocating(
@@ -108,7 +111,7 @@ class DubinsPusher(RepeatedPusher):
                 along = np.linspace(0.0, far, max(2, round(far / _EVERY)))
                 rows = np.column_stack([along, np.zeros((len(along), 2))])
                 path = np.array([se2.compose(start, row) for row in rows])
-                if not self._clear(path[-round(_RELOCATED / _EVERY) :], grip, spec):
+                if not self._clear(path, grip, spec):
                     break
                 there = se2.compose(path[-1], grip.grasp)
                 others = tuple(g for g in found if g is not grip)
@@ -118,15 +121,12 @@ class DubinsPusher(RepeatedPusher):
 
     def _clear(self, path: Array, grip: Grip, spec: RobotSpec) -> bool:
         """Whether object and robot keep away from obstacles of the map."""
-        field, wide = self._side.field, 0.5 * spec.flat_bumper.width
         items = np.array([se2.compose(pose, grip.grasp) for pose in path])
-        if field.clearances(self._item.geometry.outline, items).min() < _CLEAR:
-            return False
-        if field.clearances(spec.body_radius * _BODY, path).min() < _CLEAR:
-            return False
-        back, front = spec.body_radius, spec.push_distance
-        bumper = np.array([[back, -wide], [front, -wide], [front, wide], [back, wide]])
-        return bool(field.clearances(bumper, path).min() >= _CLEAR)
+        for outline, poses in ((self._item.geometry.outline, items), (spec.outline, path)):
+            room = self._side.field.clearances(outline, poses)
+            if room.min() < min(_CLEAR, room[0]):
+                return False
+        return True
 
     def _touched(self, item: Array) -> None:
         super()._touched(item)
@@ -164,7 +164,8 @@ def _radius(grip: Grip) -> float:
 
 def dubins(start: Array, goal: Array, radius: float) -> tuple[Array, float]:
     """Shortest path of bends no tighter than a radius [m] between poses ``(3,)``, by OMPL: poses
-    ``(n, 3)``, about ``_EVERY`` apart, and its length [m]."""
+    ``(n, 3)``, about ``_EVERY`` apart (none where it is longer than ``_LONGEST``); its length [m].
+    """
     space = base.DubinsStateSpace(radius)
     a, b, between = (space.allocState() for _ in range(3))
     for state, (x, y, heading) in ((a, start), (b, goal)):
@@ -172,6 +173,8 @@ def dubins(start: Array, goal: Array, radius: float) -> tuple[Array, float]:
         state.setY(float(y))
         state.setYaw(float(se2.wrap(float(heading))))
     length = float(space.distance(a, b))
+    if length > _LONGEST:
+        return np.zeros((0, 3)), length
     poses = []
     for part in np.linspace(0.0, 1.0, max(2, math.ceil(length / _EVERY) + 1)):
         space.interpolate(a, b, float(part), between)

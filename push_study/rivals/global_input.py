@@ -9,8 +9,10 @@ those of the robots that are in the object's region, and when fewer than half of
 gathered first. Constants and rules are those of the code that the authors published
 (aabecker/SwarmControlSandbox, January 2017).
 
-Reconstructed: their robots are moved by a force of constant size against a drag; ours drive at full
-speed in its direction. Their lengths are those of an object with a circumscribed circle of 1.5;
+Reconstructed: the variance is that of the robots in the region; their code leaves out some of them
+unless all are there. Of two regions with equally many robots, the first counts. Where their code
+has no rule for a corner, robots are not gathered. Their robots are moved by a force of constant
+size against a drag; ours drive at full speed in its direction. Their lengths are those of an object with a circumscribed circle of 1.5;
 ours are scaled by the object. Their corners are chosen for their room; in an open room, the corner
 is the nearest, and after a stop the next one. Their goal is 4 wide; so near to ours, the object
 goes straight to it.
@@ -96,15 +98,15 @@ class GlobalInput:
         here, points = pose[:2] / self._unit, robots[:, :2] / self._unit
         self._enter(pose[:2])
         with_it = points[self._inside(self._region, robots[:, :2])]
+        few = len(with_it) < _ENOUGH * len(points)
         if not len(with_it):
             with_it = points
         mean, variance = with_it.mean(axis=0), with_it.var(axis=0)
-        few = len(with_it) < _ENOUGH * len(points)
         self._watch(time, mean)
         self._gather(few, pose[:2], robots[:, :2])
+        self._judge(mean, variance, len(with_it), float(np.hypot(*(here - mean))))
         if self._lost is not None:
             return _unit(self._lost - mean)
-        self._judge(mean, variance, len(with_it), float(np.hypot(*(here - mean))))
         if self._regrouping:
             return _unit(self._gathering(mean) - mean)
         if time - self._chosen > _HOLD or time < self._chosen:
@@ -139,7 +141,7 @@ class GlobalInput:
             self._lost = None
         elif self._lost is None:
             counts = [int(self._inside(r, robots).sum()) for r in self._floor.main]
-            order = sorted(range(len(counts)), key=lambda k: -counts[k])
+            order = sorted(range(len(counts)), key=lambda k: -counts[k])  # the first of equals
             at = [k for k, r in enumerate(self._floor.main) if self._inside(r, place[None])[0]]
             key = (at or [len(counts) - 1])[0], frozenset(order[:2])
             if key in self._floor.gather:
@@ -148,7 +150,8 @@ class GlobalInput:
     def _judge(self, mean: Array, variance: Array, count: int, away: float) -> None:
         """Whether to regroup: by the variance, with hysteresis."""
         scale = count * self._arena.radius / self._unit
-        least = _PRESSED if self._stopped and away < _BESIDE else _LEAST * scale
+        pressed = self._stopped and away < _BESIDE and self._lost is None
+        least = _PRESSED if pressed else _LEAST * scale
         if (variance < least).all():
             self._regrouping = False
         if (variance > _MOST * scale).any():

@@ -39,12 +39,12 @@ def arena(room=ROOM, **settings):
     return Arena(rasterise(room), {"e0": ROBOT}, OBJECT, BOX, own)
 
 
-def run(goal, start=START, room=ROOM, limit=150.0, **settings):
+def run(goal, start=START, room=ROOM, behind=(-0.25, 0.0, 0.0), limit=150.0, **settings):
     """A task in the planar world, frame by frame, with exact poses: status, pose of the object."""
     method = DubinsPusher(arena(room, **settings))
     method.begin(Task((np.array(goal),)), BELIEF)
-    behind = se2.compose(start, np.array([-0.25, 0.0, 0.0]))
-    world = PlanarWorld(room, {"e0": (ROBOT, behind)}, {OBJECT: (BOX, start)})
+    place = se2.compose(start, np.array(behind))
+    world = PlanarWorld(room, {"e0": (ROBOT, place)}, {OBJECT: (BOX, start)})
     time = 0.0
     while method.status.phase != JobPhase.IDLE and time < limit:
         time += 0.01
@@ -98,11 +98,24 @@ def test_paths_keep_clear_of_the_map_and_the_bends_are_stable():
             found += 1
             items = np.array([se2.compose(p, grip.grasp) for p in path])
             assert field.clearances(BOX.geometry.outline, items).min() >= 0.01
+            assert field.clearances(ROBOT.outline, path).min() >= 0.01
             bends = [se2.wrap(t) for t in np.diff(path[:, 2])]
             bends = np.array(bends) / np.hypot(*np.diff(path[:, :2], axis=0).T)
             assert bends.max() <= grip.limits.maximum * 1.01
             assert bends.min() >= grip.limits.minimum * 1.01
     assert found > 20
+
+
+def test_an_object_beside_a_wall_is_pushed_away_from_it():
+    """It stands 5 mm from the left wall, and its goal is in the middle."""
+    status, item = run([0.2, 0.3, 0.4], start=np.array([-1.45, 0.0, 0.0]), behind=[0.0, 0.4, 0.0])
+    assert status.code == JobError.NONE, status.reason
+    assert np.hypot(*(item[:2] - [0.2, 0.3])) <= 0.02
+
+
+def test_hardly_any_friction_leaves_no_path_that_is_short_enough():
+    path, length = dubins(START, np.array([0.5, 0.1, 0.2]), 1e6)
+    assert length > 1e6 and not len(path)
 
 
 def test_a_goal_behind_a_wall_has_no_path_and_the_job_says_so():

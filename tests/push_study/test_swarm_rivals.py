@@ -102,9 +102,9 @@ def test_the_global_input_keeps_a_direction_for_a_second():
 
 
 def test_the_global_input_leads_the_mean_round_the_object():
-    """From in front of it to behind it, without running into it, from 20 places."""
+    """From in front of it to behind it, without running into it, from six places."""
     toward = (np.array(TARGET) - HERE[:2]) / np.hypot(*(np.array(TARGET) - HERE[:2]))
-    for angle in np.linspace(-0.4, 0.4, 20):
+    for angle in np.linspace(-0.4, 0.4, 6):
         c, s = math.cos(angle), math.sin(angle)
         mean = HERE[:2] + 0.45 * np.array(
             [c * toward[0] - s * toward[1], s * toward[0] + c * toward[1]]
@@ -131,6 +131,10 @@ def test_only_robots_in_the_region_of_the_object_count():
     way = np.array([9.0, 9.0]) - bottom  # where robots of all regions meet
     told = law.direction(0.1, np.array([-3.0, 5.5, 0.0]), few)
     assert told @ way == pytest.approx(np.hypot(*way), rel=1e-3)
+    none = np.vstack([_swarm(top, 0.3), _swarm(top, 0.3, 4)])
+    way = np.array([9.0, 9.0]) - top
+    told = law.direction(0.2, np.array([-3.0, 5.5, 0.0]), none)
+    assert told @ way == pytest.approx(np.hypot(*way), rel=1e-3)
 
 
 def test_the_policy_of_the_paper_leads_round_both_walls():
@@ -152,10 +156,12 @@ def test_the_policy_of_the_paper_leads_round_both_walls():
 
 @pytest.mark.long
 def test_the_global_input_reaches_the_figure_of_its_authors_in_their_simulation():
-    """90 s ± 35 s in ten trials; their own code, run by us, takes 30 to 300 s."""
-    rows = [paper.run(seed) for seed in (1, 2, 3)]
-    assert rows[0] == paper.run(1)
-    assert all(r["success"] and 30.0 < r["duration_s"] < 300.0 for r in rows)
+    """90 s ± 35 s in ten trials; of their own code, 57 of 60 runs take less than 300 s, with a
+    median of 69 s."""
+    rows = [paper.run(seed, 300.0) for seed in range(1, 9)]
+    assert rows[0] == paper.run(1, 300.0)
+    assert sum(r["success"] for r in rows) >= 6
+    assert 45.0 < np.median([r["duration_s"] for r in rows]) < 130.0
 
 
 def test_robots_push_where_the_object_hides_the_goal_and_go_along_it_elsewhere():
