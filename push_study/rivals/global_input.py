@@ -12,10 +12,10 @@ gathered first. Constants and rules are those of the code that the authors publi
 Reconstructed: the variance is that of the robots in the region; their code leaves out some of them
 unless all are there. Of two regions with equally many robots, the first counts. Where their code
 has no rule for a corner, robots are not gathered. Their robots are moved by a force of constant
-size against a drag; ours drive at full speed in its direction. Their lengths are those of an object with a circumscribed circle of 1.5;
-ours are scaled by the object. Their corners are chosen for their room; in an open room, the corner
-is the nearest, and after a stop the next one. Their goal is 4 wide; so near to ours, the object
-goes straight to it.
+size against a drag; ours drive at full speed in its direction. Their lengths are those of an object
+with a circumscribed circle of 1.5; ours are scaled by the object. Their corners are chosen for
+their room; in an open room, the corner is the nearest, and after a stop the next one. Their goal is
+4 wide; so near to ours, the object goes straight to it.
 """
 
 import math
