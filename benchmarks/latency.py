@@ -1,8 +1,8 @@
 """From poses to command across processes at 100 Hz, the controller following a trajectory: alone,
 with two readers of what a page reads, and with two pages in browsers on the same cores.
 
-The three take turns, several times: what other programs on the machine do within seconds then
-falls on all of them, and the median over the rounds is not that of the worst second.
+The three take turns, several times, and the medians over the rounds are compared: a burst of other
+work on the machine then spoils single rounds and not the result.
 """
 
 import os

@@ -2,8 +2,8 @@
 
 Each scenario is a setting of a paper as far as its authors published it, in text or code: the Gibbs
 random field and occlusion with several numbers of robots in one of our worlds, and the global input
-with 100 robots in the simulation of its authors. Of occlusion, no figure could be read; other
-settings neither (docs/rivals.md).
+with 100 robots in the simulation of its authors. The figures of occlusion are in a diagram, without
+numbers. No other setting could be read (docs/rivals.md).
 """
 
 import math

@@ -31,7 +31,7 @@ from push_job.report import Figure, Report, polyline
 from push_model import se2
 from push_model.arrays import Array
 from push_model.belief import Belief
-from push_model.settings import bounded, settings
+from push_model.settings import settings
 from push_model.specs import RobotSpec
 from push_study.rivals.repeated_pusher import (
     ACCELERATION,
@@ -40,7 +40,7 @@ from push_study.rivals.repeated_pusher import (
     RepeatedSettings,
 )
 from push_study.rivals.side_contact import SECTIONS, check_team
-from push_study.rivals.stable_grips import Grip, grips
+from push_study.rivals.stable_grips import Grip, GripSettings, grips
 
 _EVERY, _RELOCATED = 0.01, 0.1  # [m] between poses of a path, and between places tried
 _FARTHEST, _LONGEST = 3.0, 20.0  # [m] that an object is relocated; of a path
@@ -49,16 +49,8 @@ _WITHIN = 0.12  # [m] of a path in which a robot comes back to it
 
 
 @settings
-class DubinsSettings(RepeatedSettings):
-    """Tolerances, and the bends of pushes."""
-
-    friction_trust: float = bounded(
-        0.85,
-        low=0.1,
-        high=1.0,
-        doc="Fraction of the believed contact friction that pushes may use. They never use more "
-        "than the lower end of its believed interval (dimensionless).",
-    )
+class DubinsSettings(RepeatedSettings, GripSettings):
+    """What pushes may use, and how often and how fast it pushes."""
 
 
 class DubinsPusher(RepeatedPusher):

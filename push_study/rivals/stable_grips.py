@@ -15,8 +15,8 @@ from push_study.rivals.lone_pusher import GoalTolerances
 
 
 @settings
-class StableNmpcSettings(GoalTolerances):
-    """Tolerances, and the programme."""
+class GripSettings(GoalTolerances):
+    """Tolerances, and how much of the friction pushes may use."""
 
     friction_trust: float = bounded(
         0.85,
@@ -25,6 +25,12 @@ class StableNmpcSettings(GoalTolerances):
         doc="Fraction of the believed contact friction that pushes may use. They never use more "
         "than the lower end of its believed interval (dimensionless).",
     )
+
+
+@settings
+class StableNmpcSettings(GripSettings):
+    """What pushes may use, and the programme."""
+
     period: float = bounded(
         0.2, low=0.01, high=5.0, doc="Time between two solves of the nonlinear programme (s)."
     )
