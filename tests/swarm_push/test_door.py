@@ -15,7 +15,7 @@ from push_ros.door import Door
 from push_scenario.bodies import load_object, load_robot
 from swarm_push.swarm_method import SwarmMethod
 from tests.samples import mostly_long
-from tests.swarm_push.test_object_track import LONGEST, TICK, snake
+from tests.swarm_push.test_object_track import PART, TICK, snake
 
 ITEM, ROBOT = load_object("transport_l"), load_robot("epuck_ring")
 NAMES = tuple(f"e{k}" for k in range(20))
@@ -68,19 +68,30 @@ def rehearse(goals, ticks):
     return np.array(spent), answered, answers
 
 
+def judge_at_once(grid, pose, goals):
+    """Thread CPU [s]."""
+    method, seen = method_in(grid), Seen(0.0, pose, team(pose))
+    began = time.thread_time()
+    assert isinstance(method.assess(Task(goals), BELIEF, seen), Certificate)
+    return time.thread_time() - began
+
+
 @pytest.mark.live  # alone: others make its ticks longer
 @pytest.mark.parametrize("targets", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_no_tick_is_long_while_a_task_is_judged_in_a_large_room_with_walls(targets):
-    """20 robots, 16 m; each tick by the shorter of its times in two equal runs."""
-    _, pose, goal = snake(16.0, 0.01)
+    """20 robots, 16 m; each tick by the shortest of its times in three equal runs, against the
+    answer at once on the same machine, which may be slow or busy."""
+    grid, pose, goal = snake(16.0, 0.01)
     goals = (goal, goal + [-0.3, -0.4, 0.2], pose)[: 1 + targets]
-    runs = [rehearse(goals, 60 + 300 * targets) for _ in range(2)]
-    spent = np.minimum(runs[0][0], runs[1][0])
+    runs = [rehearse(goals, 60 + 300 * targets) for _ in range(3)]
+    whole = min(judge_at_once(grid, pose, goals[1:2]) for _ in range(3))
+    spent = np.min([run[0] for run in runs], axis=0)
     _, tick, (refusal,) = runs[0]
-    print(f"longest {1e3 * spent.max():.1f} ms, answered after {tick - 20} ticks")
+    longest = f"longest {1e3 * spent.max():.1f} ms, answered after {tick - 20} ticks"
+    print(f"{longest}; at once {whole:.2f} s")
     assert runs[1][1] == tick and refusal is None
     assert tick - 20 > 20  # far more than there is time for in one tick
-    assert spent.max() < LONGEST
+    assert spent.max() < PART * whole
 
 
 @pytest.mark.parametrize("seed", mostly_long(range(40), 5))

@@ -16,7 +16,7 @@ from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
 
 R, TICK = 0.05, 0.02
 NONE = np.zeros((0, 3))
-LONGEST = 0.02  # [s] of thread CPU
+PART = 1 / 15  # of the time of the whole search at once: no tick is as long
 FAR = [(6.0, 6.5), (6.0, -6.0), (0.0, 6.0), (-0.3, 0.0)]
 
 
@@ -66,18 +66,30 @@ def rehearse(ticks, moved_at):
     return np.array(told), np.array(spent), job, waited, searched
 
 
+def search_at_once():
+    """Thread CPU [s]."""
+    grid, pose, goal = snake(16.0, 0.01)
+    track = ObjectTrack(grid, load_object("transport_l").geometry.outline, R, TrackSettings())
+    began = time.thread_time()
+    track.plan(pose, goal, NONE)
+    return time.thread_time() - began
+
+
 @pytest.mark.live  # alone: others make its ticks longer
 def test_no_tick_is_long_in_a_large_room_and_equal_runs_are_equal():
-    """Each tick by the shorter of its times in two equal runs: the machine may be busy."""
-    runs = [rehearse(250, 160) for _ in range(2)]
+    """Each tick by the shortest of its times in three equal runs, against the search at once on the
+    same machine, which may be slow or busy."""
+    runs = [rehearse(250, 160) for _ in range(3)]
+    whole = min(search_at_once() for _ in range(3))
     assert np.array_equal(runs[0][0], runs[1][0])
-    spent = np.minimum(runs[0][1], runs[1][1])
+    spent = np.min([run[1] for run in runs], axis=0)
     _, _, job, waited, searched = runs[0]
     print(
         f"ticks: median {1e3 * np.median(spent):.1f} ms, longest {1e3 * spent.max():.1f} ms; "
-        f"{waited} until the first way was known, {searched} with a search"
+        f"{waited} until the first way was known, {searched} with a search; "
+        f"a search at once {whole:.2f} s"
     )
-    assert spent.max() < LONGEST
+    assert spent.max() < PART * whole
     assert job.track.under_way
     assert 20 < waited < 160 and searched > waited + 5
     # robots gather meanwhile: those about the object move while no way is known
