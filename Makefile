@@ -13,7 +13,7 @@ CORES = tests/push_model tests/push_scenario tests/push_estimation tests/push_pl
   tests/push_supervisor tests/push_bringup tests/planar_push tests/push_record \
   tests/grasp_opt tests/swarm_push
 
-.PHONY: docs pictures install demo test test-long test-studies test-fast coverage lint clean
+.PHONY: docs pictures benchpush install demo test test-long test-studies test-fast coverage lint clean
 install: $(STAMP)
 
 $(VENV)/bin/python:
@@ -76,5 +76,14 @@ docs: $(STAMP)
 pictures: $(STAMP)
 	$(BIN)/python -m tests.pictures
 
+# Rooms of Bench-Push for planar-push experiment bench-push: its packages exclude versions of ours.
+# benchnpin asks for PyTorch and more, which these rooms do not use.
+BENCHPUSH := .venv-benchpush
+benchpush: $(VENV)/bin/python
+	$(BIN)/python -m venv $(BENCHPUSH)
+	$(BENCHPUSH)/bin/python -m pip install -q -r push_study/bench_push/requirements.txt
+	$(BENCHPUSH)/bin/python -m pip install -q --no-deps benchnpin==0.1.1
+	$(BENCHPUSH)/bin/python -c "import benchnpin.environments.area_clearing"
+
 clean:
-	rm -rf $(VENV) results build *.egg-info
+	rm -rf $(VENV) $(BENCHPUSH) results build *.egg-info

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import binomtest, fisher_exact, pearsonr, ranksums
+from scipy.stats import t as student
 
 from push_model.arrays import Array, Mask
 
@@ -85,3 +86,11 @@ def wilson(hits: int, count: int) -> tuple[float, float]:
         return 0.0, 1.0
     interval = binomtest(hits, count).proportion_ci(method="wilson")
     return float(interval.low), float(interval.high)
+
+
+def mean_interval(values: Array) -> tuple[float, float]:
+    """95 % interval of a mean (Student's t); without bounds for fewer than three values."""
+    if len(values) < 3:
+        return -math.inf, math.inf
+    half = float(student.ppf(0.975, len(values) - 1) * values.std(ddof=1) / math.sqrt(len(values)))
+    return float(values.mean()) - half, float(values.mean()) + half

@@ -11,11 +11,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import t as student
 
 from push_study.leaderboard.entry import Entry
 from push_study.pool import Row
-from push_study.statistics import wilson
+from push_study.statistics import mean_interval, wilson
 
 Interval = tuple[float, float]
 
@@ -76,14 +75,6 @@ def _cell(contest: str, method: str, entry: Entry, rows: Sequence[Row]) -> Cell 
         _mean(np.array(cpu)),
         min((float(r["clearance_m"]) for r in good), default=math.nan),
     )
-
-
-def mean_interval(values: np.ndarray) -> Interval:
-    """95 % interval of a mean (Student's t); without bounds for fewer than three values."""
-    if len(values) < 3:
-        return -math.inf, math.inf
-    half = float(student.ppf(0.975, len(values) - 1) * values.std(ddof=1) / math.sqrt(len(values)))
-    return float(values.mean()) - half, float(values.mean()) + half
 
 
 def leads(first: Cell, second: Cell) -> bool:

@@ -93,7 +93,7 @@ def test_every_package_that_is_imported_is_a_dependency():
     names = {"yaml": "pyyaml", "PIL": "pillow", **of_pydantic}
     known = {requirement(line) for line in PROJECT["project"]["dependencies"]}
     extra = {"launch", "distributed", "dask", "motioncapture", "shapely", "pytest", "hypothesis"}
-    extra |= {"gymnasium", "pettingzoo", "gym_pusht", "pymunk"}
+    extra |= {"gymnasium", "pettingzoo", "gym_pusht", "pymunk", "benchnpin"}
     ours = {name.split(".")[0] for name in PROJECT["tool"]["setuptools"]["packages"]}
     third = set()
     for package in ours - {"push_config", "benchmarks"}:

@@ -1,0 +1,168 @@
+"""Straight pushes with a wide flat front that take several objects out of an area at once.
+
+A sweep begins behind the last object that it takes and ends where the front is beyond an edge of
+the area. It takes an object whose centre lies well within the width of the front; an object that
+the front would catch by a corner excludes a sweep, for it would turn away at the front's end.
+"""
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from push_model.arrays import Array
+from push_model.outlines import overlap
+
+_BESIDE = (-0.7, -0.375, 0.0, 0.375, 0.7)
+"""Where an object lies in a sweep that is laid out for it, in halves of the front's width."""
+_BESIDE_SHIFTED = (0.0, -0.4, 0.4, -0.78, 0.78)  # likewise, of a shift
+_SHIFTS = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0)  # [m]
+_TAKEN = 0.79  # of half the width, within which the centre of an object that is taken lies
+
+
+@dataclass(frozen=True)
+class Front:
+    """Of a robot. ahead: [m] of it before the robot's origin. behind: [m] that the robot reaches
+    behind its origin. half_width: [m]."""
+
+    ahead: float
+    behind: float
+    half_width: float
+
+
+@dataclass(frozen=True)
+class Area:
+    """To be cleared. edges: ``(2, 2)`` [m] each, over which objects may leave. limits: ``(2,)``
+    [m], beyond which there are walls, in both directions. fixed: ``(k, 2)`` [m] outlines of what
+    cannot be moved. outline: ``(k, 2)`` [m]. spare: [m] that an object needs beyond an edge."""
+
+    outline: Array
+    edges: tuple[Array, ...]
+    limits: Array
+    fixed: tuple[Array, ...]
+    spare: float
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """start, end: ``(2,)`` [m] of the robot's origin. heading: [rad]. takes: a bit for each object
+    that leaves the area; 0 of a shift."""
+
+    start: Array
+    end: Array
+    heading: float
+    takes: int
+
+
+def sweeps(area: Area, front: Front, boxes: Sequence[Array], margin: float) -> list[Sweep]:
+    """All sweeps over each edge that are laid out for an object and keep off what is fixed.
+
+    Parameters
+    ----------
+    boxes: outlines ``(k, 2)`` [m] of the objects in the area.
+    margin: [m] between front and objects at the start, and to what is not to be touched.
+    """
+    found: list[Sweep] = []
+    for edge in area.edges:
+        along = (edge[1] - edge[0]) / np.linalg.norm(edge[1] - edge[0])
+        out = np.array([-along[1], along[0]])
+        if out @ (edge.mean(axis=0) - area.outline.mean(axis=0)) < 0.0:
+            out = -out
+        found += _over(area, front, boxes, margin, edge, (along, out))
+    return found
+
+
+def shifts(area: Area, front: Front, boxes: Sequence[Array], margin: float) -> list[Sweep]:
+    """Straight pushes within the area that bring an object to where a sweep takes it.
+
+    For objects that no sweep takes, e.g. between columns. Arguments as of ``sweeps``.
+    """
+    sides = np.roll(area.outline, -1, axis=0) - area.outline
+    found = []
+    for number, box in enumerate(boxes):
+        others = [other for k, other in enumerate(boxes) if k != number]
+        for side in sides / np.linalg.norm(sides, axis=1)[:, None]:
+            out = np.array([-side[1], side[0]])
+            middle = float((box @ side).mean())
+            start = float((box @ out).min()) - margin - front.ahead
+            for part, length in itertools.product(_BESIDE_SHIFTED, _SHIFTS):
+                lane = middle + part * front.half_width
+                ways = start * out + lane * side, (start + length) * out + lane * side
+                shift = Sweep(*ways, math.atan2(out[1], out[0]), 0)
+                far = float((box @ out).max()) + length + margin
+                if not _has_room(area, front, shift, (side, out), margin, far):
+                    continue
+                moved = [box + (length - margin) * out, *others]
+                if any(s.takes & 1 for s in sweeps(area, front, moved, margin)):
+                    found.append(shift)
+                    break
+    return found
+
+
+def _over(
+    area: Area,
+    front: Front,
+    boxes: Sequence[Array],
+    margin: float,
+    edge: Array,
+    axes: tuple[Array, Array],
+) -> list[Sweep]:
+    """Over one edge; ``axes`` are its direction and the one out of the area."""
+    along, out = axes
+    across = [box @ along for box in boxes]
+    depth = [box @ out for box in boxes]
+    low, high = sorted(edge @ along)
+    level, half = float(edge[0] @ out), front.half_width
+    middles = np.array([a.mean() for a in across])
+    farthest = sorted(range(len(boxes)), key=lambda k: -float(depth[k].mean()))
+    found, seen = [], set()
+    for middle in middles:
+        for part in _BESIDE:
+            lane = float(middle) + part * half
+            if lane - half / 2 < low or lane + half / 2 > high:
+                continue
+            lane_takes = [k for k in farthest if abs(middles[k] - lane) <= _TAKEN * half]
+            for count in range(1, len(lane_takes) + 1):
+                takes = sum(1 << k for k in lane_takes[:count])
+                if (takes, round(lane, 2)) in seen:
+                    continue
+                seen.add((takes, round(lane, 2)))
+                last = min(float(depth[k].min()) for k in lane_takes[:count])
+                start = last - margin - front.ahead
+                if any(
+                    not takes >> k & 1
+                    and abs(float(across[k].mean()) - lane) < half + margin + np.ptp(across[k]) / 2
+                    and float(depth[k].max()) > start - front.behind
+                    for k in range(len(boxes))
+                ):
+                    continue
+                heading = math.atan2(out[1], out[0])
+                end = max(start, level + 0.08 - front.ahead)
+                sweep = Sweep(start * out + lane * along, end * out + lane * along, heading, takes)
+                if _has_room(area, front, sweep, (along, out), margin, level + area.spare):
+                    found.append(sweep)
+    return found
+
+
+def _has_room(
+    area: Area,
+    front: Front,
+    sweep: Sweep,
+    axes: tuple[Array, Array],
+    margin: float,
+    far: float,
+) -> bool:
+    """Whether robot and objects of a sweep keep off walls and what is fixed, up to where the
+    objects come at the farthest, ``far`` [m] along the second axis."""
+    along, out = axes
+    lane, start = float(sweep.start @ along), float(sweep.start @ out)
+    if (np.abs(sweep.start) > area.limits - front.ahead).any():
+        return False
+    if (np.abs(far * out) > area.limits).any():
+        return False
+    wide = front.half_width + margin / 2
+    corners = ((start - front.behind, -wide), (start - front.behind, wide), (far, wide))
+    swath = np.array([d * out + (lane + a) * along for d, a in (*corners, (far, -wide))])
+    return not any(overlap(swath, fixed) for fixed in area.fixed)
