@@ -42,7 +42,7 @@ class AreaClearing:
         """
         Parameters
         ----------
-        pose: ``(3,)`` of the robot.
+        pose: ``(3,)`` [m, rad] of the robot in the room.
         boxes: outlines ``(k, 2)`` [m] of all objects, also those that have left the area.
 
         Returns

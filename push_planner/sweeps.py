@@ -3,6 +3,7 @@
 A sweep begins behind the last object that it takes and ends where the front is beyond an edge of
 the area. It takes an object whose centre lies well within the width of the front; an object that
 the front would catch by a corner excludes a sweep, for it would turn away at the front's end.
+Points are in the frame of the room, whose origin is at its centre.
 """
 
 import itertools
@@ -19,13 +20,14 @@ _BESIDE = (-0.7, -0.375, 0.0, 0.375, 0.7)
 """Where an object lies in a sweep that is laid out for it, in halves of the front's width."""
 _BESIDE_SHIFTED = (0.0, -0.4, 0.4, -0.78, 0.78)  # likewise, of a shift
 _SHIFTS = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0)  # [m]
+_BEYOND = 0.08  # [m] beyond the edge that the front comes
 _TAKEN = 0.79  # of half the width, within which the centre of an object that is taken lies
 
 
 @dataclass(frozen=True)
 class Front:
-    """Of a robot. ahead: [m] of it before the robot's origin. behind: [m] that the robot reaches
-    behind its origin. half_width: [m]."""
+    """Of a robot. ahead: [m] from the robot's origin to the front. behind: [m] that the robot
+    reaches behind its origin. half_width: [m] of the front."""
 
     ahead: float
     behind: float
@@ -139,7 +141,7 @@ def _over(
                 ):
                     continue
                 heading = math.atan2(out[1], out[0])
-                end = max(start, level + 0.08 - front.ahead)
+                end = max(start, level + _BEYOND - front.ahead)
                 sweep = Sweep(start * out + lane * along, end * out + lane * along, heading, takes)
                 if _has_room(area, front, sweep, (along, out), margin, level + area.spare):
                     found.append(sweep)

@@ -89,7 +89,7 @@ def wilson(hits: int, count: int) -> tuple[float, float]:
 
 
 def mean_interval(values: Array) -> tuple[float, float]:
-    """95 % interval of a mean (Student's t); without bounds for fewer than three values."""
+    """95 % interval of the mean of values ``(k,)`` (Student's t); no bounds if k is below 3."""
     if len(values) < 3:
         return -math.inf, math.inf
     half = float(student.ppf(0.975, len(values) - 1) * values.std(ddof=1) / math.sqrt(len(values)))
