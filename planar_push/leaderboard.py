@@ -25,7 +25,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "default: all of the table",
     )
     parser.add_argument("--trials", type=whole(1), help="matches per cell; default 20, quick 3")
-    parser.add_argument("--uncertainty", default="mild", help="as of planar-push experiment")
+    parser.add_argument(
+        "--uncertainty",
+        default="contest",
+        help="as of planar-push experiment; default contest: mild with poses at 50 Hz",
+    )
     parser.add_argument("--world", default="planar", help="planar or pybullet")
     add_study(parser)
 

@@ -130,6 +130,9 @@ class OpenRoomMethod:
         self._name, self._make, self._arena, self._ways = name, make, arena, ways
         self._settings = arena.section("", OpenRoomSettings)
         self._law: VelocityLaw | None = None
+        self._walled: WalledLaw | None = None
+        self._named: NamedLaw | None = None
+        self._twisting: TwistLaw | None = None
         self._targets: tuple[Array, ...] = ()
         self._index, self._code = 0, JobError.NONE
         self._reason, self._busy = "waiting for a goal", False
@@ -180,7 +183,7 @@ class OpenRoomMethod:
         self._reason = f"target {self._index + 1} of {len(self._targets)}"
         self._next, self._held = -math.inf, np.zeros((0, 2))
         self._nearest, self._closer = math.inf, math.nan
-        self._law = self._make(
+        law = self._law = self._make(
             OpenRoom(
                 self._size,
                 self._item,
@@ -190,6 +193,9 @@ class OpenRoomMethod:
                 self._settings.seed,
             )
         )
+        self._walled = law if isinstance(law, WalledLaw) else None
+        self._named = law if isinstance(law, NamedLaw) else None
+        self._twisting = law if isinstance(law, TwistLaw) else None
 
     def step(self, seen: Seen, belief: Belief) -> Told:
         """See Method."""
@@ -206,7 +212,7 @@ class OpenRoomMethod:
             away, _ = self.errors(seen)
         origin = np.array([*self._middle, 0.0])
         pose = self._item.mass_pose(seen.object) - origin
-        left = self._law.left(pose) if isinstance(self._law, WalledLaw) else away
+        left = away if self._walled is None else self._walled.left(pose)
         if not self._progresses(seen.time, left):
             text = f"the object has not come closer for {self._settings.stalled:g} s"
             self.end(JobError.EXECUTION_FAILED, text)
@@ -216,23 +222,23 @@ class OpenRoomMethod:
         waits = 1e-9 < self._next - seen.time < _STEP + 1e-9  # else time has jumped back
         if not waits or names != self._names:
             self._next, self._names = seen.time + _STEP, names
-            if isinstance(self._law, NamedLaw):
-                self._law.meet(names)
+            if self._named is not None:
+                self._named.meet(names)
             try:
                 self._held = self._decided(self._law, seen.time, pose, robots - origin)
             except NoWay as problem:
                 self.end(JobError.PLANNING_FAILED, str(problem))
                 return Told()
         told = self._held
-        if robot.kinematics is not None and not isinstance(self._law, TwistLaw):
+        if robot.kinematics is not None and self._twisting is None:
             told = robot.kinematics.follow(told, robots[:, 2], _LEAD)
         return Told({n: (float(a), float(b)) for n, (a, b) in zip(names, told, strict=True)})
 
     def _decided(self, law: VelocityLaw, now: float, pose: Array, robots: Array) -> Array:
         """``(n, 2)`` velocities, or twists of robots with two wheels whose law steers them."""
         robot = self._arena.robot
-        if robot.kinematics is not None and isinstance(law, TwistLaw):
-            return law.twists(now, pose, robots)
+        if robot.kinematics is not None and self._twisting is not None:
+            return self._twisting.twists(now, pose, robots)
         chosen = law.velocities(now, pose, robots)
         slowed: Array = chosen / np.maximum(np.hypot(*chosen.T) / robot.max_speed, 1.0)[:, None]
         return slowed

@@ -104,18 +104,17 @@ def poses_from_ros(
     return poses, refused
 
 
-def contacts_to_ros(contacts: Sequence[Any], seconds: float) -> Contacts:
-    """Contacts of a world (body_a, body_b, position, normal, force, duty), of a time [s]."""
+def contacts_to_ros(contacts: Any, seconds: float) -> Contacts:
+    """Contacts of a time [s], as columns: body_a, body_b ``(n,)``; position, normal, force
+    ``(n, 3)``; duty ``(n,)``."""
     message = Contacts()
     message.header.frame_id = FRAME
     message.header.stamp = time_to_ros(seconds)
-    message.body_a = [c.body_a for c in contacts]
-    message.body_b = [c.body_b for c in contacts]
-    for field, prefix in (("position", ""), ("normal", "normal_"), ("force", "force_")):
-        table = np.array([getattr(c, field) for c in contacts], dtype=np.float64).reshape(-1, 3)
-        for axis, column in zip("xyz", table.T, strict=True):
-            setattr(message, prefix + axis, _doubles(column))
-    message.duty = _doubles(np.array([c.duty for c in contacts]))
+    message.body_a, message.body_b = contacts.body_a, contacts.body_b
+    message.x, message.y, message.z = map(_doubles, contacts.position.T)
+    message.normal_x, message.normal_y, message.normal_z = map(_doubles, contacts.normal.T)
+    message.force_x, message.force_y, message.force_z = map(_doubles, contacts.force.T)
+    message.duty = _doubles(contacts.duty)
     return message
 
 

@@ -148,6 +148,7 @@ class TeamObserver(Node):
         super().__init__("team_observer")
         self._names, self._robots = (OBJECT, *robots), tuple(robots)
         self._movable = frozenset(self._names)
+        self._rows = {robot: row for row, robot in enumerate(self._robots)}
         self._meanwhile, self._last, self._reported = meanwhile, -math.inf, math.nan
         self._phase = ""
         self.trace = TeamTrace()
@@ -180,9 +181,10 @@ class TeamObserver(Node):
         forces, hit, wall = np.zeros((len(self._robots), 2)), False, False
         for k, (a, b) in enumerate(zip(message.body_a, message.body_b, strict=True)):
             other, sign = (b, 1.0) if a == OBJECT else (a, -1.0)  # the force is on body a
-            if OBJECT in (a, b) and other in self._robots:
-                force = sign * np.array([message.force_x[k], message.force_y[k]])
-                forces[self._robots.index(other)] += force
+            row = self._rows.get(other) if OBJECT in (a, b) else None
+            if row is not None:
+                forces[row, 0] += sign * message.force_x[k]
+                forces[row, 1] += sign * message.force_y[k]
             else:
                 hit = True
                 wall |= not self._movable.issuperset((a, b))

@@ -151,6 +151,8 @@ class Uncertainty:
 UNCERTAINTIES = {
     "none": Uncertainty(0.0, 0.0, 100.0, (0.0, 0.0), spread=0.0),
     "mild": Uncertainty(),
+    # Mild, with poses as often as the laws of swarms decide.
+    "contest": Uncertainty(rate=50.0),
     # Bumpers whose friction is a guess, on the object and on each other; a box whose load is not
     # centred; a motion capture of half the rate, with jitter, whose latency is known to 20 ms.
     "hard": Uncertainty(

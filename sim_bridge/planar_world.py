@@ -21,7 +21,7 @@ from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
 from sim_bridge.planar.constraints import HOLONOMIC
 from sim_bridge.planar.solve import advance
 from sim_bridge.planar.tables import grown, make_contacts, make_sums, make_tables
-from sim_bridge.world import BodyPoses, Contact, WheelState
+from sim_bridge.world import BodyContacts, BodyPoses, WheelState
 from sim_bridge.worlds import Objects, Robots, WorldKind, steps_of
 
 _FEW = 12  # robots that are commanded one by one
@@ -75,7 +75,7 @@ class PlanarWorld:
             [start for _, start in [*robots.values(), *objects.values()]], dtype=np.float64
         ).reshape(-1, 3)
         tables = make_tables(environment, robots, objects)
-        self._fixed_names = list(tables.fixed)
+        self._touchable = (*self._all, *tables.fixed)
         self._bodies, self._centres = tables.bodies, tables.centres
         self._off_centre = bool(self._centres.any())
         self._parts, self._near, self._largest = tables.parts, tables.near, tables.largest
@@ -215,22 +215,23 @@ class PlanarWorld:
                 self._contacts = grown(self._contacts)
                 self._sums = grown(self._sums)
 
-    def read_contacts(self) -> list[Contact]:
+    def read_contacts(self) -> BodyContacts:
         """Contacts since the last reading, averaged over its steps."""
-        sums, bodies = self._sums, len(self._all)
+        sums = self._sums
         rows, steps = int(sums.number[0]), max(1, int(sums.number[1]))
-        v, found = sums.values[:rows], []
+        v = sums.values[:rows]
         places, normals, forces = np.zeros((3, rows, 3))
         places[:, :2] = v[:, 2:4] / v[:, 6:7]
         normals[:, :2] = v[:, 4:6] / np.maximum(np.hypot(v[:, 4], v[:, 5]), 1e-12)[:, None]
         forces[:, :2] = v[:, :2] / steps
-        duties = (v[:, 7] / steps).tolist()
-        for k, key in enumerate(sums.keys[:rows].tolist()):
-            a, other = key >> 32, key & 0xFFFFFFFF
-            name = self._all[other] if other < bodies else self._fixed_names[other - bodies]
-            found.append(Contact(self._all[a], name, places[k], normals[k], forces[k], duties[k]))
+        duties, keys = v[:, 7] / steps, sums.keys[:rows].tolist()
+        names = self._touchable
         self._clear_sums()
-        return found
+        return BodyContacts(
+            [names[key >> 32] for key in keys],
+            [names[key & 0xFFFFFFFF] for key in keys],
+            *(places, normals, forces, duties),
+        )
 
     def poses(self) -> BodyPoses:
         """Ground truth of every body that is there."""

@@ -24,7 +24,7 @@ from sim_bridge.settings import PhysicsSettings
 from sim_bridge.speed_body import SpeedBody
 from sim_bridge.torque_body import TorqueBody
 from sim_bridge.walls import Walls
-from sim_bridge.world import BodyPoses, Contact, WheelState
+from sim_bridge.world import BodyContacts, BodyPoses, WheelState
 from sim_bridge.worlds import Objects, Robots, WorldKind, steps_of
 
 _AWAY = 1000.0  # [m] where removed bodies are kept
@@ -196,9 +196,9 @@ class PyBulletWorld:
             if contacts:
                 self._contacts.add()
 
-    def read_contacts(self) -> list[Contact]:
+    def read_contacts(self) -> BodyContacts:
         """Contacts since the last reading, averaged over its steps."""
-        return self._contacts.read(self._contact_names)
+        return BodyContacts.of(self._contacts.read(self._contact_names))
 
     def _frames(self, bodies: Sequence[int]) -> tuple[Array, Array]:
         """Positions ``(n, 3)`` of centres of mass and headings ``(n,)``."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, overload
 
 import numpy as np
 
@@ -26,6 +26,63 @@ class Contact:
     normal: Array
     force: Array
     duty: float
+
+
+class BodyContacts(Sequence[Contact]):
+    """Contacts as columns that can also be read one by one.
+
+    body_a, body_b: ``(n,)`` names. position, normal, force: ``(n, 3)``. duty: ``(n,)``, see
+    Contact.
+    """
+
+    __slots__ = ("body_a", "body_b", "duty", "force", "normal", "position")
+
+    def __init__(
+        self,
+        body_a: Sequence[str],
+        body_b: Sequence[str],
+        position: Array,
+        normal: Array,
+        force: Array,
+        duty: Array,
+    ) -> None:
+        self.body_a, self.body_b = list(body_a), list(body_b)
+        self.position, self.normal, self.force, self.duty = position, normal, force, duty
+
+    @classmethod
+    def of(cls, contacts: Sequence[Contact]) -> "BodyContacts":
+        """The columns of contacts."""
+        vectors = [
+            np.array([getattr(c, name) for c in contacts], dtype=np.float64).reshape(-1, 3)
+            for name in ("position", "normal", "force")
+        ]
+        return cls(
+            [c.body_a for c in contacts],
+            [c.body_b for c in contacts],
+            *(vectors[0], vectors[1], vectors[2]),
+            np.array([c.duty for c in contacts], dtype=np.float64),
+        )
+
+    def __len__(self) -> int:
+        return len(self.body_a)
+
+    @overload
+    def __getitem__(self, row: int) -> Contact: ...
+
+    @overload
+    def __getitem__(self, row: slice) -> list[Contact]: ...
+
+    def __getitem__(self, row: int | slice) -> Contact | list[Contact]:
+        if isinstance(row, slice):
+            return [self[k] for k in range(*row.indices(len(self)))]
+        return Contact(
+            self.body_a[row],
+            self.body_b[row],
+            self.position[row],
+            self.normal[row],
+            self.force[row],
+            float(self.duty[row]),
+        )
 
 
 @dataclass(frozen=True)
@@ -63,7 +120,7 @@ class BodyPoses(Mapping[str, Array]):
         return len(self.names)
 
     def only(self, keep: Mask) -> "BodyPoses":
-        """The contacts that a mask ``(n,)`` selects."""
+        """The bodies that a mask ``(n,)`` selects."""
         if keep.all():
             return self
         chosen = np.flatnonzero(keep)
@@ -131,7 +188,7 @@ class World(Protocol):
         """State of a robot's wheels; None if it has none."""
         ...
 
-    def read_contacts(self) -> list[Contact]:
+    def read_contacts(self) -> BodyContacts:
         """Contacts since the last reading, averaged over its steps. The floor is left out."""
         ...
 

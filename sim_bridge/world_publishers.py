@@ -95,7 +95,8 @@ class WorldPublishers:
 
     def truth(self, world: World, poses: BodyPoses, tick: int, seconds: float) -> None:
         """What is so at a time [s] of the simulation."""
-        self._clock.publish(Clock(clock=time_to_ros(seconds)))
+        if self._clock.get_subscription_count():
+            self._clock.publish(Clock(clock=time_to_ros(seconds)))
         if self._truth.get_subscription_count():
             self._truth.publish(frame_to_ros(poses.names, poses.table, seconds))
         if self.contacts_heard:

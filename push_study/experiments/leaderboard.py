@@ -16,7 +16,7 @@ from push_study.study import StudyOptions
 
 SCENARIOS = tuple(CONTESTS)
 """Contests, where none are named."""
-OPTIONS = {"uncertainty": "mild", "world": "planar"}
+OPTIONS = {"uncertainty": "contest", "world": "planar"}
 
 
 def tasks(options: StudyOptions) -> list[Match]:

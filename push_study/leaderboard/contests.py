@@ -51,6 +51,8 @@ class Contest:
 SWARM = 20
 SIZE, START, TARGET = 5.0, (-0.7, -0.7), (0.7, 0.7)  # [m]
 _REACHED, _LIMIT = 0.1, 300.0  # [m]; [s]: 19 times what a robot at full speed would take
+STALLED = 180.0
+"""[s] after which the job of a contest of positions fails if the object has come no closer."""
 _EXACT = 0.02, 0.1  # [m], [rad]
 
 

@@ -13,7 +13,7 @@ from push_model.occupancy import rasterise
 from push_scenario.bodies import load_robot
 from push_scenario.scenario import Scenario
 from push_study.experiments.swarm_outline import mistaken
-from push_study.leaderboard.contests import Contest, Problem, contest, straight
+from push_study.leaderboard.contests import STALLED, Contest, Problem, contest, straight
 from push_study.leaderboard.entries import POSITIONS, entry_of
 from push_study.leaderboard.entry import Entry
 from push_study.pool import Row
@@ -86,7 +86,7 @@ def _scenario(match: Match, what: Contest, entry: Entry, problem: Problem) -> Sc
         rules = {
             "position_tolerance": what.tolerance[0],
             "orientation": False,
-            "stalled": what.limit,
+            "stalled": min(STALLED, what.limit),
             "seed": match.seed,
         }
         known = {f.name for f in fields(spec.sections[""])} if "" in spec.sections else set()

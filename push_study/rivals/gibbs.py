@@ -14,6 +14,7 @@ are slower than theirs do everything slower, in proportion.
 
 import math
 
+import numba
 import numpy as np
 
 from push_job.open_room import OpenRoom, open_room_method
@@ -68,10 +69,17 @@ class Gibbs:
             period = _PERIOD / self._pace
             self._next = (time if self._next < time - period else self._next) + period
             corners = se2.transform(pose, self._arena.item.geometry.outline)
-            seen = self._neighbours(robots, corners)
+            places, room = robots[:, :2].copy(), np.array(self._arena.size)
+            mates = _neighbours(places, corners, self._goal)
             before = self._drawn.copy()
             for i in range(len(robots)):
-                self._drawn[i] = self._draw(i, robots, before, seen[i], corners)
+                tried = before[i] + self._random.normal(0.0, _DEVIATION, (_SAMPLES, 2))
+                tried = np.vstack([before[i], _saturated(tried, _LARGEST)])
+                U = _mates(places[i], places[mates[i]], before[mates[i]], tried)
+                _add_walls(U, robots[i], tried, room, self._goal, self._arena.target, self._extent)
+                _add_object(U, robots[i], tried, corners, self._arena.target)
+                accept = self._random.random(_SAMPLES)
+                self._drawn[i] = _saturated(_mean_of_walk(tried, U, accept)[None], _LARGEST)[0]
 
     def _steered(self, robots: Array) -> tuple[Array, Array]:
         """``(n,)`` speeds ahead [m/s] and ``(n,)`` turn rates [rad/s]."""
@@ -82,130 +90,202 @@ class Gibbs:
         speed = np.minimum(_GAIN * size, np.where(far, _TURNING, _STRAIGHT))
         return self._pace * speed, self._pace * np.where(far, _TURN, _STEER) * off
 
-    def _neighbours(self, robots: Array, corners: Array) -> Mask:
-        """``(n, n)`` who senses whom: near, and neither the object nor its outline at the goal is
-        between."""
-        places = robots[:, :2]
-        near = np.hypot(*(places[:, None] - places).transpose(2, 0, 1)) <= _SENSING
-        np.fill_diagonal(near, False)
-        for i, k in zip(*np.nonzero(np.triu(near)), strict=True):
-            way = (places[k] - places[i])[None]
-            if any(np.isfinite(_reach(places[i], way, c)[0]) for c in (corners, self._goal)):
-                near[i, k] = near[k, i] = False
-        found: Mask = near
-        return found
 
-    def _draw(self, i: int, robots: Array, before: Array, mates: Mask, corners: Array) -> Array:
-        tried = before[i] + self._random.normal(0.0, _DEVIATION, (_SAMPLES, 2))
-        tried = np.vstack([before[i], _saturated(tried, _LARGEST)])
-        there = robots[i, :2] + _STEP * tried
-        U = self._walls(robots[i], there)
-        U = U + self._mates(robots[mates, :2], before[mates], tried, there)
-        U = U + self._object(robots[i], tried, there, corners)
-        accept = self._random.random(_SAMPLES)
-        last, kept = 0, []
-        for k in range(_SAMPLES + 1):
-            if k > 0 and (U[k] < U[last] or accept[k - 1] < math.exp(min(0.0, U[last] - U[k]))):
-                last = k
-            if k >= _BURNT:
-                kept.append(tried[last])
-        drawn: Array = _saturated(np.mean(kept, axis=0)[None], _LARGEST)[0]
-        return drawn
-
-    def _object(self, robot: Array, tried: Array, there: Array, corners: Array) -> Array:
-        angles = robot[2] + np.arange(0.0, 2.0 * math.pi, _RAY)
-        rays = _SENSING * np.column_stack([np.cos(angles), np.sin(angles)])
-        reach = _reach(robot[:2], rays, corners)
-        hit = np.isfinite(reach)
-        if not hit.any():
-            return np.zeros(len(tried))
-        points = robot[:2] + np.where(hit, reach, 1.0)[:, None] * rays
-        away = np.hypot(*(there[:, None] - points).transpose(2, 0, 1)) + 1e-9
-        within = hit & (away < _SENSING)
-        if self._hides(robot[:2], points[hit]):
-            # The first point of the scan that is near enough decides.
-            first = within.argmax(axis=1)
-            nearest = away[np.arange(len(tried)), first]
-            pull = _potential(_HIDING * nearest, _STRONG)
-            return np.where(within.any(axis=1), pull, 0.0)
-        U = np.where(within, _potential(_BESIDE * away, _PULL), 0.0).sum(axis=1)
-        following = np.roll(points, -1, axis=0)
-        both = within & np.roll(within, -1, axis=1)
-        c, s = math.cos(robot[2]), math.sin(robot[2])
-        d = points[hit] - robot[:2]
-        left = c * d[:, 1] - s * d[:, 0] > 0.0
-        way = (following - points) * (1.0 if (~left).sum() >= left.sum() else -1.0)
-        count = both.sum(axis=1)
-        pull_along = (both[..., None] * way).sum(axis=1) - count[:, None] * tried
-        mass = _ALONG * _MASS * count
-        value: Array = U + _kinetic(_saturated(pull_along, 1.0), tried, mass)
-        return value
-
-    def _hides(self, here: Array, points: Array) -> bool:
-        """Whether the object is between a robot and the target: points on both sides of the line,
-        not much fewer on one of them."""
-        d, p = self._arena.target - here, points - here
-        nearer = np.hypot(*(points - self._arena.target).T) <= np.hypot(*d)
-        side = (d[0] * p[:, 1] - d[1] * p[:, 0])[nearer]
-        left, right = int((side > 0.0).sum()), int((side < 0.0).sum())
-        return left > 0 and right > 0 and min(left / right, right / left) > _SHARE
-
-    def _mates(self, places: Array, moving: Array, tried: Array, there: Array) -> Array:
-        if not len(places):
-            return _kinetic(np.zeros_like(tried), tried, _MASS)
-        moved = places + _STEP * moving
-        gap = np.hypot(*(there[:, None] - moved).transpose(2, 0, 1)) + 1e-9
-        U = _potential(_MATE * gap, -_CHARGE).sum(axis=1)
-        count = (gap > _SAFE) & (gap < _SENSING)
-        pull = ((moving - tried[:, None]) * count[..., None]).sum(axis=1)
-        mass = _MASS * (1.0 + count.sum(axis=1))
-        U = U + _kinetic(_saturated(pull, 1.0), tried, mass)
-        return np.where((gap > _SENSING).any(axis=1), _LOST, U)
-
-    def _walls(self, robot: Array, there: Array) -> Array:
-        half = 0.5 * np.array(self._arena.size)
-        from_goal = float(np.hypot(*(robot[:2] - self._arena.target)))
-        if (half - np.abs(robot[:2]) > _SENSING).all() and from_goal > _SENSING + self._extent:
-            return np.zeros(len(there))
-        angles = robot[2] + np.arange(0.0, 2.0 * math.pi, _WALL_RAY)
-        rays = _SENSING * np.column_stack([np.cos(angles), np.sin(angles)])
-        with np.errstate(divide="ignore"):
-            reach = ((np.copysign(half, rays) - robot[:2]) / rays).min(axis=1)
-        reach = np.minimum(reach, _reach(robot[:2], rays, self._goal))
-        points = robot[:2] + np.clip(reach, 0.0, 1.0)[:, None] * rays
-        away = np.hypot(*(there[:, None] - points).transpose(2, 0, 1)) + 1e-9
-        near = away <= 0.9 * _SAFE
-        U: Array = np.where(near, _potential(_WALL * away, _CHARGE), 0.0).sum(axis=1)
-        return U
+# Kernels. Potentials U ``(m,)`` are of velocities ``tried (m, 2)`` of one robot; corners, goal are
+# outlines ``(k, 2)`` of the object, here and at the goal.
 
 
-def _reach(start: Array, ways: Array, corners: Array) -> Array:
-    """``(m,)`` parts of ways ``(m, 2)`` at which they first meet an outline; inf where never."""
-    edge = np.roll(corners, -1, axis=0) - corners
-    d = corners - start
-    x, y = ways[:, :1], ways[:, 1:]
-    cross = x * edge[:, 1] - y * edge[:, 0]
-    parallel = np.abs(cross) < 1e-12
-    safe = np.where(parallel, 1.0, cross)
-    t = (d[:, 0] * edge[:, 1] - d[:, 1] * edge[:, 0]) / safe
-    u = (d[:, 0] * y - d[:, 1] * x) / safe
-    met = ~parallel & (t >= 0.0) & (t <= 1.0) & (u >= 0.0) & (u <= 1.0)
-    first: Array = np.where(met, t, math.inf).min(axis=1)
+@numba.njit(cache=True)
+def _reach(x: float, y: float, way_x: float, way_y: float, corners: Array) -> float:
+    """Part of a way from a point at which it first meets an outline; inf where it does not."""
+    first = math.inf
+    n = len(corners)
+    for k in range(n):
+        after = k + 1 if k + 1 < n else 0
+        edge_x, edge_y = corners[after, 0] - corners[k, 0], corners[after, 1] - corners[k, 1]
+        dx, dy = corners[k, 0] - x, corners[k, 1] - y
+        cross = way_x * edge_y - way_y * edge_x
+        if abs(cross) < 1e-12:
+            continue
+        t = (dx * edge_y - dy * edge_x) / cross
+        u = (dx * way_y - dy * way_x) / cross
+        if 0.0 <= t <= 1.0 and 0.0 <= u <= 1.0 and t < first:
+            first = t
     return first
 
 
-def _potential(r: Array, charge: float) -> Array:
+@numba.njit(cache=True)
+def _neighbours(places: Array, corners: Array, goal: Array) -> Mask:
+    """``(n, n)`` who senses whom: near, and neither the object nor its outline at the goal is
+    between."""
+    n = len(places)
+    near = np.zeros((n, n), dtype=np.bool_)
+    for i in range(n):
+        for k in range(i + 1, n):
+            dx, dy = places[k, 0] - places[i, 0], places[k, 1] - places[i, 1]
+            if math.hypot(dx, dy) > _SENSING:
+                continue
+            x, y = places[i, 0], places[i, 1]
+            hidden = _reach(x, y, dx, dy, corners) < math.inf or (
+                _reach(x, y, dx, dy, goal) < math.inf
+            )
+            near[i, k] = near[k, i] = not hidden
+    return near
+
+
+@numba.njit(cache=True)
+def _potential(r: float, charge: float) -> float:
     """Coulomb and Buckingham's, with the constants of their code: depth and permittivity 0.04,
     radius 0.8, steepness 1."""
-    r = np.maximum(r, 1e-3)
-    value: Array = 0.04 * (6.0 / -5.0 * math.e * (1.0 - r / 0.8) + 1.0 / 5.0 * (0.8 / r) ** 6)
-    value += charge / (4.0 * math.pi * 0.04 * r)
-    return value
+    r = max(r, 1e-3)
+    value = 0.04 * (6.0 / -5.0 * math.e * (1.0 - r / 0.8) + 1.0 / 5.0 * (0.8 / r) ** 6)
+    return value + charge / (4.0 * math.pi * 0.04 * r)
 
 
-def _kinetic(relative: Array, own: Array, mass: Array | float) -> Array:
-    energy: Array = 0.5 * mass * ((relative**2).sum(axis=1) + _LARGEST - (own**2).sum(axis=1))
-    return energy
+@numba.njit(cache=True)
+def _kinetic(pull_x: float, pull_y: float, own_x: float, own_y: float, mass: float) -> float:
+    """pull: of which neither component counts for more than 1."""
+    scale = min(1.0, 1.0 / max(abs(pull_x), abs(pull_y), 1e-12))
+    relative = (pull_x * scale) ** 2 + (pull_y * scale) ** 2
+    return 0.5 * mass * (relative + _LARGEST - (own_x**2 + own_y**2))
+
+
+@numba.njit(cache=True)
+def _mates(place: Array, places: Array, moving: Array, tried: Array) -> Array:
+    """Of a robot at ``(2,)`` among neighbours at ``(k, 2)`` that move ``(k, 2)`` [m/s]."""
+    U = np.zeros(len(tried))
+    for s in range(len(tried)):
+        x, y = place[0] + _STEP * tried[s, 0], place[1] + _STEP * tried[s, 1]
+        count, pull_x, pull_y, lost = 0, 0.0, 0.0, False
+        for k in range(len(places)):
+            dx = x - (places[k, 0] + _STEP * moving[k, 0])
+            dy = y - (places[k, 1] + _STEP * moving[k, 1])
+            gap = math.hypot(dx, dy) + 1e-9
+            U[s] += _potential(_MATE * gap, -_CHARGE)
+            if _SAFE < gap < _SENSING:
+                count += 1
+                pull_x += moving[k, 0] - tried[s, 0]
+                pull_y += moving[k, 1] - tried[s, 1]
+            lost |= gap > _SENSING
+        U[s] += _kinetic(pull_x, pull_y, tried[s, 0], tried[s, 1], _MASS * (1.0 + count))
+        if lost:
+            U[s] = _LOST
+    return U
+
+
+@numba.njit(cache=True)
+def _add_walls(
+    U: Array, robot: Array, tried: Array, room: Array, goal: Array, target: Array, extent: float
+) -> None:
+    """Of the walls of a room of this size [m] with the origin in its middle, and of the object's
+    outline at the goal, whose corners are within extent [m] of the target."""
+    x, y = robot[0], robot[1]
+    half_x, half_y = 0.5 * room[0], 0.5 * room[1]
+    inner = half_x - abs(x) > _SENSING and half_y - abs(y) > _SENSING
+    if inner and math.hypot(x - target[0], y - target[1]) > _SENSING + extent:
+        return
+    for k in range(int(math.ceil(2.0 * math.pi / _WALL_RAY))):
+        angle = robot[2] + k * _WALL_RAY
+        ray_x, ray_y = _SENSING * math.cos(angle), _SENSING * math.sin(angle)
+        reach = _reach(x, y, ray_x, ray_y, goal)
+        if ray_x != 0.0:
+            reach = min(reach, (math.copysign(half_x, ray_x) - x) / ray_x)
+        if ray_y != 0.0:
+            reach = min(reach, (math.copysign(half_y, ray_y) - y) / ray_y)
+        reach = min(max(reach, 0.0), 1.0)
+        point_x, point_y = x + reach * ray_x, y + reach * ray_y
+        for s in range(len(tried)):
+            dx, dy = x + _STEP * tried[s, 0] - point_x, y + _STEP * tried[s, 1] - point_y
+            away = math.hypot(dx, dy) + 1e-9
+            if away <= 0.9 * _SAFE:
+                U[s] += _potential(_WALL * away, _CHARGE)
+
+
+@numba.njit(cache=True)
+def _scan(robot: Array, corners: Array) -> tuple[Array, Mask]:
+    """``(m, 2)`` where the rays of a robot's scan end, ``(m,)`` whether at the object."""
+    m = int(math.ceil(2.0 * math.pi / _RAY))
+    points, hit = np.empty((m, 2)), np.zeros(m, dtype=np.bool_)
+    for k in range(m):
+        angle = robot[2] + k * _RAY
+        ray_x, ray_y = _SENSING * math.cos(angle), _SENSING * math.sin(angle)
+        reach = _reach(robot[0], robot[1], ray_x, ray_y, corners)
+        hit[k] = reach < math.inf
+        if not hit[k]:
+            reach = 1.0
+        points[k, 0], points[k, 1] = robot[0] + reach * ray_x, robot[1] + reach * ray_y
+    return points, hit
+
+
+@numba.njit(cache=True)
+def _hides(robot: Array, points: Array, hit: Mask, target: Array) -> bool:
+    """Whether the object is between a robot and the target: points on both sides of the line,
+    not much fewer on one of them."""
+    dx, dy = target[0] - robot[0], target[1] - robot[1]
+    left = right = 0
+    for k in range(len(points)):
+        px, py = points[k, 0], points[k, 1]
+        if not hit[k] or math.hypot(px - target[0], py - target[1]) > math.hypot(dx, dy):
+            continue
+        side = dx * (py - robot[1]) - dy * (px - robot[0])
+        left += side > 0.0
+        right += side < 0.0
+    return left > 0 and right > 0 and min(left, right) / max(left, right) > _SHARE
+
+
+@numba.njit(cache=True)
+def _add_object(U: Array, robot: Array, tried: Array, corners: Array, target: Array) -> None:
+    """Of the object, as a robot scans it."""
+    points, hit = _scan(robot, corners)
+    if not hit.any():
+        return
+    hidden = _hides(robot, points, hit, target)
+    m = len(points)
+    c, s = math.cos(robot[2]), math.sin(robot[2])
+    left = right = 0
+    for k in range(m):
+        if hit[k]:
+            aside = c * (points[k, 1] - robot[1]) - s * (points[k, 0] - robot[0])
+            left += aside > 0.0
+            right += aside <= 0.0
+    sign = 1.0 if right >= left else -1.0
+    away = np.empty(m)
+    for j in range(len(tried)):
+        x, y = robot[0] + _STEP * tried[j, 0], robot[1] + _STEP * tried[j, 1]
+        for k in range(m):
+            away[k] = math.hypot(x - points[k, 0], y - points[k, 1]) + 1e-9
+        if hidden:  # the first point of the scan that is near enough decides
+            for k in range(m):
+                if hit[k] and away[k] < _SENSING:
+                    U[j] += _potential(_HIDING * away[k], _STRONG)
+                    break
+            continue
+        count, pull_x, pull_y = 0, 0.0, 0.0
+        for k in range(m):
+            if not (hit[k] and away[k] < _SENSING):
+                continue
+            U[j] += _potential(_BESIDE * away[k], _PULL)
+            after = k + 1 if k + 1 < m else 0
+            if hit[after] and away[after] < _SENSING:
+                count += 1
+                pull_x += sign * (points[after, 0] - points[k, 0])
+                pull_y += sign * (points[after, 1] - points[k, 1])
+        pull_x -= count * tried[j, 0]
+        pull_y -= count * tried[j, 1]
+        mass = _ALONG * _MASS * count
+        U[j] += _kinetic(pull_x, pull_y, tried[j, 0], tried[j, 1], mass)
+
+
+@numba.njit(cache=True)
+def _mean_of_walk(tried: Array, U: Array, accept: Array) -> Array:
+    """``(2,)`` mean of the later samples of Metropolis and Hastings."""
+    last, total = 0, np.zeros(2)
+    for k in range(len(U)):
+        if k > 0 and (U[k] < U[last] or accept[k - 1] < math.exp(min(0.0, U[last] - U[k]))):
+            last = k
+        if k >= _BURNT:
+            total += tried[last]
+    return total / (len(U) - _BURNT)
 
 
 def _saturated(v: Array, most: float) -> Array:

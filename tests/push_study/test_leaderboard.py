@@ -231,7 +231,7 @@ def test_only_settings_that_a_method_has_are_set(monkeypatch):
     for method in ("crescent", "occlusion", "global input"):
         with pytest.raises(InterruptedError):
             play(Match("open-square", 7, "", method, "planar", "mild"))
-    rules = {"position_tolerance": 0.1, "orientation": False, "stalled": 300.0}
+    rules = {"position_tolerance": 0.1, "orientation": False, "stalled": 180.0}
     assert rules.items() <= seen[0].items() and "seed" not in seen[0]
     assert seen[1] == seen[2] == {**rules, "seed": 7}
 

@@ -15,7 +15,7 @@ from push_study.experiments import rival_papers, swarm_rivals
 from push_study.reproductions import gibbs as paper_of_gibbs
 from push_study.reproductions import global_input as paper
 from push_study.reproductions import occlusion as paper_of_occlusion
-from push_study.rivals.gibbs import Gibbs, _reach
+from push_study.rivals.gibbs import Gibbs, _add_walls, _neighbours, _reach
 from push_study.rivals.global_input import GlobalInput
 from push_study.rivals.occlusion import Occlusion
 from push_study.study import StudyOptions
@@ -215,16 +215,19 @@ def test_the_random_field_decides_fifteen_times_a_second():
 
 def test_the_random_field_keeps_off_the_outline_at_the_goal_and_does_not_see_through_it():
     """Robots in front of an edge of that outline, 10 cm and 30 cm off."""
-    rival = Gibbs(replace(FAR, target=np.zeros(2)))
-    edge = SQUARE.geometry.outline[:, 0].max()
-    there = np.array([[0.01, 0.0], [0.0, 0.0], [-0.01, 0.0]])
+    goal, room = SQUARE.geometry.outline, np.array(FAR.size)
+    extent = float(np.hypot(*goal.T).max())
+    edge = goal[:, 0].max()
+    tried = np.array([[1.0, 0.0], [0.0, 0.0], [-1.0, 0.0]])  # 10 ms ahead
     for off, some in ((0.10, True), (0.30, False)):
         robot = np.array([edge + off, 0.0, 0.0])
-        U = rival._walls(robot, robot[:2] + there)
+        U = np.zeros(3)
+        _add_walls(U, robot, tried, room, goal, np.zeros(2), extent)
         assert (U[0] < U[1] < U[2]) if some else (U == 0.0).all()
-    seen = rival._neighbours(
-        np.array([[-0.22, 0.1, 0.0], [0.22, 0.1, 0.0], [0.3, 0.3, 0.0]]),
+    seen = _neighbours(
+        np.array([[-0.22, 0.1], [0.22, 0.1], [0.3, 0.3]]),
         se2.transform(AT_THE_WALL, SQUARE.geometry.outline),
+        goal,
     )
     assert not seen[0, 1] and not seen[1, 0] and seen[1, 2] and seen[2, 1]
 
@@ -302,7 +305,7 @@ def test_rays_of_the_random_field_end_at_the_outline():
         if inside(corners, start[None])[0]:
             continue
         way = random.normal(size=2)
-        reach = float(_reach(start, way[None], corners)[0])
+        reach = _reach(*start, *way, corners)
         line = start + np.linspace(0.0, min(reach, 1.0), 200, endpoint=False)[:, None] * way
         assert not inside(corners, line).any()
         if math.isfinite(reach):

@@ -129,7 +129,7 @@ def test_hard_poses_have_jitter_and_mild_ones_have_not():
 
 
 def test_an_unknown_name_is_refused():
-    with pytest.raises(SettingsError, match="none, mild, hard"):
+    with pytest.raises(SettingsError, match="none, mild, contest, hard"):
         uncertainty("much")
 
 

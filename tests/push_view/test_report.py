@@ -21,7 +21,7 @@ from push_view.bodies import bodies_of
 from push_view.drawing import body_vertices, draw_trajectory, moments
 from push_view.playback import playback_json
 from push_view.report import PRODUCTS, final_error, write_report
-from sim_bridge.world import Contact
+from sim_bridge.world import BodyContacts, Contact
 
 TYPES = {
     "group_plan": "push_msgs/msg/GroupPlan",
@@ -77,7 +77,8 @@ class Bag:
     def touch(self, pairs, time, space="/"):
         zero = np.zeros(3)
         contacts = [Contact(a, b, zero, np.array([1.0, 0, 0]), zero, 1.0) for a, b in pairs]
-        self.write(f"{space}contacts", contacts_to_ros(contacts, time), time)
+        message = contacts_to_ros(BodyContacts.of(contacts), time)
+        self.write(f"{space}contacts", message, time)
 
     def status(self, robot, time, **values):
         message = ControllerStatus(mode=2, robot=robot, **values)
