@@ -18,16 +18,17 @@ from push_model.arrays import Array
 from push_model.jobs import GoalRefused, JobError
 from push_model.settings import SettingsError
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
-from push_msgs.msg import Belief, Contacts, Poses, Report
+from push_msgs.msg import Belief, Report
 from push_ros.claims import own_domain
-from push_ros.conversions import poses_from_ros, time_from_ros
+from push_ros.conversions import time_from_ros
 from push_ros.method_node import MethodNode
 from push_ros.names import Names
-from push_ros.qos import BELIEF, STATUS, STREAM
+from push_ros.qos import BELIEF, STATUS
 from push_scenario.scenario import Scenario
 from push_study.graph_run import LockstepRun
 from push_study.pool import Row
 from push_study.uncertainty import Uncertainty
+from sim_bridge.world import BodyContacts, BodyPoses
 
 OBJECT = "object"
 """The name of the object in a made scenario."""
@@ -136,7 +137,8 @@ class Outcome:
 
 
 class TeamObserver(Node):
-    """Watches a team from ground truth. For evaluation only."""
+    """Watches a team from ground truth, of which the bridge of the same process tells it, and from
+    the reports of its method. For evaluation only."""
 
     def __init__(
         self,
@@ -146,28 +148,32 @@ class TeamObserver(Node):
     ) -> None:
         """meanwhile: called with the time [s] and poses ``(1 + n, 3)`` of object and robots."""
         super().__init__("team_observer")
-        self._names, self._robots = (OBJECT, *robots), tuple(robots)
+        self._names = (OBJECT, *robots)
         self._movable = frozenset(self._names)
-        self._rows = {robot: row for row, robot in enumerate(self._robots)}
+        self._rows = {robot: row for row, robot in enumerate(robots)}
+        self._shown: tuple[str, ...] = ()
+        self._places = np.zeros(0, dtype=np.intp)  # in what is shown, of each name; -1 for none
         self._meanwhile, self._last, self._reported = meanwhile, -math.inf, math.nan
         self._phase = ""
         self.trace = TeamTrace()
         self.recording = False
-        self.create_subscription(Poses, names.world("ground_truth/poses"), self._on_truth, STREAM)
-        self.create_subscription(Contacts, names.world("contacts"), self._on_contacts, STREAM)
         self.create_subscription(Report, names.team("report"), self._on_report, STATUS)
         self.create_subscription(Belief, names.world("belief"), self._on_belief, BELIEF)
 
-    def _on_truth(self, message: Poses) -> None:
-        poses, _ = poses_from_ros(message, self._names)
-        if OBJECT not in poses:
+    def see(self, time: float, poses: BodyPoses, contacts: BodyContacts) -> None:
+        """What is so at a time [s], and the contacts of the tick that ends then."""
+        if poses.names != self._shown:
+            self._shown = poses.names
+            place = {name: row for row, name in enumerate(poses.names)}
+            self._places = np.array([place.get(n, -1) for n in self._names], dtype=np.intp)
+        if self._places[0] < 0:
             return
-        gone = np.full(3, np.nan)
-        table = np.array([poses.get(n, gone) for n in self._names])
+        table = poses.table[self._places]
+        table[self._places < 0] = np.nan
         self.trace.now = table
-        time = time_from_ros(message.header.stamp)
         if not self.recording:
             return
+        self._touch(time, contacts)
         if time - self._last >= TRACE - 1e-9:
             self._last = time
             self.trace.times.append(time)
@@ -175,20 +181,17 @@ class TeamObserver(Node):
         if self._meanwhile is not None:
             self._meanwhile(time, table)
 
-    def _on_contacts(self, message: Contacts) -> None:
-        if not self.recording:
-            return
-        forces, hit, wall = np.zeros((len(self._robots), 2)), False, False
-        for k, (a, b) in enumerate(zip(message.body_a, message.body_b, strict=True)):
+    def _touch(self, time: float, contacts: BodyContacts) -> None:
+        forces, hit, wall = np.zeros((len(self._rows), 2)), False, False
+        for a, b, force in zip(contacts.body_a, contacts.body_b, contacts.force, strict=True):
             other, sign = (b, 1.0) if a == OBJECT else (a, -1.0)  # the force is on body a
             row = self._rows.get(other) if OBJECT in (a, b) else None
             if row is not None:
-                forces[row, 0] += sign * message.force_x[k]
-                forces[row, 1] += sign * message.force_y[k]
+                forces[row] += sign * force[:2]
             else:
                 hit = True
                 wall |= not self._movable.issuperset((a, b))
-        self.trace.force_times.append(time_from_ros(message.header.stamp))
+        self.trace.force_times.append(time)
         self.trace.forces.append(forces)
         self.trace.collision_ticks += hit
         self.trace.obstacle_ticks += wall
@@ -272,8 +275,9 @@ def _run(
     with LockstepRun(
         believed, observer, world=actual, quiet=True, system=system, observe_bodies=False
     ) as run:
-        run.start()
         node, watcher = run.supervisor, watchers[0]
+        run.bridge.witness = watcher.see
+        run.start()
         if not isinstance(node, MethodNode):
             raise SettingsError(f"the system '{system}' is not a method; give the name of a method")
         run.spin_until(lambda: len(watcher.trace.now) > 0 and node.seen is not None, 5.0)

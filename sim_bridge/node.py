@@ -3,6 +3,7 @@
 import math
 import sys
 import time
+from collections.abc import Callable
 from typing import IO, Any
 
 import numpy as np
@@ -30,9 +31,12 @@ from sim_bridge.disturbances import Disturbances, displace
 from sim_bridge.motion_capture import MotionCapture
 from sim_bridge.pace import Lockstep, RealTime
 from sim_bridge.settings import BridgeSettings, MotionCaptureSettings
-from sim_bridge.world import World
+from sim_bridge.world import BodyContacts, BodyPoses, World
 from sim_bridge.world_publishers import WorldPublishers
 from sim_bridge.worlds import steps_of, world_kind
+
+Witness = Callable[[float, BodyPoses, BodyContacts], None]
+"""Of a time [s], the true poses, and the contacts of the tick that ends then."""
 
 _PATIENT = 0.2  # [s] wall time without an answer until the bridge looks who is in the graph
 _SHOWN = 5  # names in a warning
@@ -79,6 +83,9 @@ class BridgeNode(Node):
         self._pace = RealTime(self.period, self.settings.real_time_factor)
         self._seed = self.settings.seed
         self.world: World | None = None
+        self.witness: Witness | None = None
+        """Told what is so after every tick, for evaluation in the same process. Nothing that moves
+        a robot may know it."""
         self.running = False
         self._paused = False
         self._autostart = autostart
@@ -243,11 +250,15 @@ class BridgeNode(Node):
         if done:
             self.get_logger().info("; ".join(done))
             self._recount()
-        world.step(self._steps, contacts=outputs.contacts_heard)
+        touching = outputs.contacts_heard or self.witness is not None
+        world.step(self._steps, contacts=touching)
         self.tick += 1
         self._intake.now = self.time
         poses = world.poses()
-        outputs.truth(world, poses, self.tick, self.time)
+        contacts = world.read_contacts() if touching else None
+        outputs.truth(world, poses, contacts, self.tick, self.time)
+        if self.witness is not None and contacts is not None:
+            self.witness(self.time, poses, contacts)
         frame = self._capture.observe(self.tick, poses)
         if frame is None:
             return None

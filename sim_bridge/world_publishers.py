@@ -26,7 +26,7 @@ from push_ros.qos import CLOCK, LATCHED, STATUS, STREAM
 from push_scenario.scenario import Scenario
 from sim_bridge.markers import body_markers
 from sim_bridge.motion_capture import Frame
-from sim_bridge.world import BodyPoses, World
+from sim_bridge.world import BodyContacts, BodyPoses, World
 from tf2_msgs.msg import TFMessage
 
 _LOOK = 10
@@ -93,14 +93,21 @@ class WorldPublishers:
         """Whether anybody wants to know of contacts."""
         return bool(self._contacts.get_subscription_count())
 
-    def truth(self, world: World, poses: BodyPoses, tick: int, seconds: float) -> None:
-        """What is so at a time [s] of the simulation."""
+    def truth(
+        self,
+        world: World,
+        poses: BodyPoses,
+        contacts: BodyContacts | None,
+        tick: int,
+        seconds: float,
+    ) -> None:
+        """What is so at a time [s] of the simulation. contacts: where somebody wants them."""
         if self._clock.get_subscription_count():
             self._clock.publish(Clock(clock=time_to_ros(seconds)))
         if self._truth.get_subscription_count():
             self._truth.publish(frame_to_ros(poses.names, poses.table, seconds))
-        if self.contacts_heard:
-            self._contacts.publish(contacts_to_ros(world.read_contacts(), seconds))
+        if contacts is not None and self.contacts_heard:
+            self._contacts.publish(contacts_to_ros(contacts, seconds))
         if tick % _LOOK == 1:
             self._heard = [r for r, p in self._joints.items() if p.get_subscription_count()]
         for robot in self._heard:
