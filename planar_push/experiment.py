@@ -20,8 +20,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--uncertainty",
-        help="what the nodes do not know: none, mild, shape, hard or unknown (docs/results.md); "
-        "refused if the study has no choice",
+        help="what the nodes do not know: none, mild, contest, shape, hard or unknown "
+        "(docs/results.md); refused if the study has no choice",
     )
     parser.add_argument(
         "--world", help="pybullet or planar; refused if the study supports only one"
@@ -34,14 +34,15 @@ def run(arguments: argparse.Namespace) -> int:
     from push_study.study import StudyOptions, complete, experiment, run_study
 
     given, out = names(arguments.scenarios), study_folder(arguments, arguments.name)
+    what = experiment(arguments.name)
     options = StudyOptions(
-        given or experiment(arguments.name).SCENARIOS,
+        given or what.SCENARIOS,
         arguments.trials,
         arguments.seed,
         out,
         arguments.scheduler,
         arguments.workers,
-        arguments.uncertainty or "mild",
+        arguments.uncertainty or what.OPTIONS.get("uncertainty", "mild"),
         arguments.world or "",
         frozenset(o for o in ("uncertainty", "world") if getattr(arguments, o) is not None),
     )

@@ -27,7 +27,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--trials", type=whole(1), help="matches per cell; default 20, quick 3")
     parser.add_argument(
         "--uncertainty",
-        default="contest",
         help="as of planar-push experiment; default contest: mild with poses at 50 Hz",
     )
     parser.add_argument("--world", default="planar", help="planar or pybullet")
@@ -41,14 +40,15 @@ def run(arguments: argparse.Namespace) -> int:
     sys.path.insert(0, str(Path.cwd()))  # entries of a user's own files
     contests = arguments.contests or (QUICK if arguments.quick else "")
     chosen = names(contests)
+    what = experiment("leaderboard")
     options = StudyOptions(
-        chosen or experiment("leaderboard").SCENARIOS,
+        chosen or what.SCENARIOS,
         arguments.trials or (3 if arguments.quick else 20),
         arguments.seed,
         study_folder(arguments, "leaderboard"),
         arguments.scheduler,
         arguments.workers,
-        arguments.uncertainty,
+        arguments.uncertainty or what.OPTIONS["uncertainty"],
         arguments.world,
         frozenset(),
         names(arguments.methods),

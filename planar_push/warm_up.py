@@ -83,10 +83,12 @@ def _placements() -> None:
 
 
 def _methods() -> None:
-    """The first steps of a group and of a swarm, in an open room and among walls."""
+    """The first steps of a group, of swarms in an open room and among walls, and of rivals."""
     from grasp_opt.group_method import GROUP
     from grasp_opt.warm_up import warm_up
     from push_scenario.scenario import load_scenario
+    from push_study.rivals.gibbs import METHOD as GIBBS
+    from push_study.rivals.occlusion import METHOD as OCCLUSION
     from swarm_push.own_sensing import METHOD as OWN_SENSING
     from swarm_push.swarm_method import SWARM
 
@@ -96,6 +98,8 @@ def _methods() -> None:
         _begin(method, load_scenario(name))
     for name in ("own-sensing", "swarm-walls"):
         _begin(OWN_SENSING, load_scenario(name), turned=False)
+    for rival in (GIBBS, OCCLUSION):
+        _begin(rival, load_scenario("swarm-square"), turned=False)
 
 
 def _batches() -> None:

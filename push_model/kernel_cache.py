@@ -29,6 +29,7 @@ PACKAGES = (
     "push_mpc",
     "push_planner",
     "push_qp",
+    "push_study",
     "sim_bridge",
     "swarm_push",
 )

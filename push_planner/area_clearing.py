@@ -1,7 +1,8 @@
-"""Clears an area of objects: the next sweep, as the first of a tour that takes all of them.
+"""Clears an area of objects: the next sweep, as the first of a tour of sweeps.
 
-The tour is planned anew before every sweep, from the poses that are seen then. Its cost is the way
-that the robot drives, and a little for turns on the spot. Between sweeps the robot drives over a
+The tour takes all objects that any sweep takes, and is planned anew before every sweep, from the
+poses that are seen then. Its cost is the way that the robot drives, and a little for turns on the
+spot. Between sweeps the robot drives over a
 lattice. Places near objects cost more, but are not forbidden: where there is no way round, the
 robot moves objects aside.
 """
@@ -20,7 +21,7 @@ from push_planner.sweeps import Area, Front, Sweep, shifts, sweeps
 _PITCH = 0.25  # [m] of the lattice
 _STEPS = ((1, 0), (0, 1), (1, 1), (1, -1), (2, 1), (1, 2), (2, -1), (1, -2))
 _NEAR = ((0.9, 6.0), (1.25, 2.0))  # [m] from an object, and what a metre costs there beyond one
-_FIXED = ((0.85, 200.0), (1.3, 2.0))  # of what is fixed
+_FIXED = ((1.35, 200.0), (1.6, 2.0))  # of what is fixed
 _TURN = 0.35  # [m/rad] of way that a turn on the spot is worth
 _MARGIN = 0.12  # [m]
 
@@ -38,7 +39,7 @@ class AreaClearing:
         walls = (area.limits - np.abs(self._points)).min(axis=1)
         self._fixed = 1.0 + _dear(np.minimum(walls, self._away(area.fixed)), _FIXED)
 
-    def next_sweep(self, pose: Array, boxes: Sequence[Array]) -> tuple[Array, Sweep, int] | None:
+    def next_sweep(self, pose: Array, boxes: Sequence[Array]) -> tuple[Array, Sweep] | None:
         """
         Parameters
         ----------
@@ -47,10 +48,9 @@ class AreaClearing:
 
         Returns
         -------
-        Points ``(k, 2)`` [m] on the way to the sweep's start, which is the last of them, the sweep,
-        and how many sweeps the tour has. The bits of ``takes`` count the given objects. Where no
-        sweep takes an object, a shift is returned, and 0. None if the area is clear, or no shift
-        helps.
+        Points ``(k, 2)`` [m] on the way to the sweep's start, which is the last of them, and the
+        sweep. The bits of ``takes`` count the given objects. Where no sweep takes any object, a
+        shift is returned in its place. None if the area is clear, or no shift helps.
         """
         within = [k for k, box in enumerate(boxes) if overlap(self._area.outline, box)]
         inner = [boxes[k] for k in within]
@@ -60,7 +60,7 @@ class AreaClearing:
             there = shifts(self._area, self._front, inner, _MARGIN)
         if not there:
             return None
-        dear = self._fixed + _dear(self._away(inner), _NEAR)
+        dear = self._fixed + _dear(self._away(boxes), _NEAR)
         starts = self._nearest(np.array([s.start for s in there]))
         ends = self._nearest(np.array([s.end for s in there]))
         here = self._nearest(pose[None, :2])[0]
@@ -76,7 +76,7 @@ class AreaClearing:
         if shifted:
             order = [int(costs[-1].argmin())]
         else:
-            order, _ = covering_tour(costs[-1], costs[:-1], np.array([s.takes for s in there]))
+            order = covering_tour(costs[-1], costs[:-1], np.array([s.takes for s in there]))
         chosen, place = there[order[0]], starts[order[0]]
         places = [place]
         while places[-1] != here:
@@ -84,7 +84,7 @@ class AreaClearing:
         way = [pose[:2], *self._points[places[-2:0:-1]], chosen.start]
         takes = sum(1 << within[k] for k in range(len(within)) if chosen.takes >> k & 1)
         sweep = Sweep(chosen.start, chosen.end, chosen.heading, takes)
-        return self._straightened(np.array(way), dear), sweep, 0 if shifted else len(order)
+        return self._straightened(np.array(way), dear), sweep
 
     def _edges(self) -> tuple[Array, Array, Array]:
         """Numbers of the ends, and lengths [m], of the lattice's edges."""

@@ -5,10 +5,12 @@ from numpy.typing import NDArray
 
 from push_model.arrays import Array
 
+_MOST = 16  # objects: the table has a row for each set of them
+
 
 def covering_tour(
-    first: Array, between: Array, takes: NDArray[np.int64]
-) -> tuple[list[int], float]:
+    first: Array, between: Array, takes: NDArray[np.int64], home: Array | None = None
+) -> list[int]:
     """The cheapest sequence of pushes, each of which takes a further object, that together take all
     objects that any push takes.
 
@@ -21,14 +23,21 @@ def covering_tour(
     first: ``(p,)`` cost of a push, with the way to it from here.
     between: ``(p, p)`` cost of push j, with the way to it from the end of push i, at ``[i, j]``.
     takes: ``(p,)`` the objects that a push takes, a bit each; not 0.
+    home: ``(p,)`` cost of the way from the end of a push to where the tour ends; 0 if not given.
 
     Returns
     -------
-    Numbers of the pushes, and their cost. None, and 0, where there is no push.
+    Numbers of the pushes in their order; an empty list where there is no push.
+
+    Raises
+    ------
+    ValueError: more than 16 objects.
     """
     if not len(first):
-        return [], 0.0
+        return []
     every = int(np.bitwise_or.reduce(takes))
+    if every >= 1 << _MOST:
+        raise ValueError(f"a tour takes at most {_MOST} objects, got {every.bit_length()}")
     best = np.full((every + 1, len(first)), np.inf)
     before = np.full((every + 1, len(first), 2), -1, dtype=np.int64)
     best[takes, np.arange(len(first))] = first
@@ -44,9 +53,9 @@ def covering_tour(
         then, chosen = then[better], further[better]
         best[then, chosen] = cost[better]
         before[then, chosen] = np.column_stack([np.full(len(then), taken), known[last[better]]])
-    push = int(best[every].argmin())
-    total, taken, order = float(best[every, push]), every, []
+    push = int((best[every] + (0.0 if home is None else home)).argmin())
+    taken, order = every, []
     while push >= 0:
         order.append(push)
         taken, push = (int(v) for v in before[taken, push])
-    return order[::-1], total
+    return order[::-1]

@@ -17,7 +17,8 @@ from push_model.arrays import Array
 from push_model.outlines import overlap
 
 _BESIDE = (-0.7, -0.375, 0.0, 0.375, 0.7)
-"""Where an object lies in a sweep that is laid out for it, in halves of the front's width."""
+"""Where the centre of an object lies in a sweep that is laid out for it, as a share of half the
+front's width."""
 _BESIDE_SHIFTED = (0.0, -0.4, 0.4, -0.78, 0.78)  # likewise, of a shift
 _SHIFTS = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0)  # [m]
 _BEYOND = 0.08  # [m] beyond the edge that the front comes
@@ -64,7 +65,8 @@ def sweeps(area: Area, front: Front, boxes: Sequence[Array], margin: float) -> l
     Parameters
     ----------
     boxes: outlines ``(k, 2)`` [m] of the objects in the area.
-    margin: [m] between front and objects at the start, and to what is not to be touched.
+    margin: [m] between front and objects at the start, and to what is not to be touched. A robot
+        that turns on the spot at the start may touch objects all the same.
     """
     found: list[Sweep] = []
     for edge in area.edges:
@@ -79,10 +81,12 @@ def sweeps(area: Area, front: Front, boxes: Sequence[Array], margin: float) -> l
 def shifts(area: Area, front: Front, boxes: Sequence[Array], margin: float) -> list[Sweep]:
     """Straight pushes within the area that bring an object to where a sweep takes it.
 
-    For objects that no sweep takes, e.g. between columns. Arguments as of ``sweeps``.
+    For objects that no sweep takes, e.g. between columns. Arguments as of ``sweeps``. Pushes that
+    would move a second object too are returned only if every possible push would.
     """
     sides = np.roll(area.outline, -1, axis=0) - area.outline
-    found = []
+    found: list[Sweep] = []
+    crowded: list[Sweep] = []
     for number, box in enumerate(boxes):
         others = [other for k, other in enumerate(boxes) if k != number]
         for side in sides / np.linalg.norm(sides, axis=1)[:, None]:
@@ -96,11 +100,19 @@ def shifts(area: Area, front: Front, boxes: Sequence[Array], margin: float) -> l
                 far = float((box @ out).max()) + length + margin
                 if not _has_room(area, front, shift, (side, out), margin, far):
                     continue
+                begins = _swath(front, shift, (side, out), margin, start + front.ahead)
+                if any(overlap(begins, other) for other in others):
+                    continue
+                way = _swath(front, shift, (side, out), margin, far)
+                alone = not any(overlap(way, other) for other in others)
+                if found and not alone:
+                    continue
                 moved = [box + (length - margin) * out, *others]
                 if any(s.takes & 1 for s in sweeps(area, front, moved, margin)):
-                    found.append(shift)
-                    break
-    return found
+                    (found if alone else crowded).append(shift)
+                    if alone:
+                        break
+    return found or crowded
 
 
 def _over(
@@ -158,13 +170,18 @@ def _has_room(
 ) -> bool:
     """Whether robot and objects of a sweep keep off walls and what is fixed, up to where the
     objects come at the farthest, ``far`` [m] along the second axis."""
-    along, out = axes
-    lane, start = float(sweep.start @ along), float(sweep.start @ out)
-    if (np.abs(sweep.start) > area.limits - front.ahead).any():
+    swath = _swath(front, sweep, axes, margin, far)
+    if (np.abs(swath) > area.limits).any():
         return False
-    if (np.abs(far * out) > area.limits).any():
-        return False
-    wide = front.half_width + margin / 2
-    corners = ((start - front.behind, -wide), (start - front.behind, wide), (far, wide))
-    swath = np.array([d * out + (lane + a) * along for d, a in (*corners, (far, -wide))])
     return not any(overlap(swath, fixed) for fixed in area.fixed)
+
+
+def _swath(
+    front: Front, sweep: Sweep, axes: tuple[Array, Array], margin: float, far: float
+) -> Array:
+    """``(4, 2)`` [m] from the robot's rear at the start to ``far`` [m] along the second axis."""
+    along, out = axes
+    lane, rear = float(sweep.start @ along), float(sweep.start @ out) - front.behind
+    wide = front.half_width + margin / 2
+    corners = ((rear, -wide), (rear, wide), (far, wide), (far, -wide))
+    return np.array([d * out + (lane + a) * along for d, a in corners])

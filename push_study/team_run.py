@@ -166,6 +166,8 @@ class TeamObserver(Node):
             self._shown = poses.names
             place = {name: row for row, name in enumerate(poses.names)}
             self._places = np.array([place.get(n, -1) for n in self._names], dtype=np.intp)
+        if self.recording:
+            self._touch(time, contacts)
         if self._places[0] < 0:
             return
         table = poses.table[self._places]
@@ -173,7 +175,6 @@ class TeamObserver(Node):
         self.trace.now = table
         if not self.recording:
             return
-        self._touch(time, contacts)
         if time - self._last >= TRACE - 1e-9:
             self._last = time
             self.trace.times.append(time)
@@ -228,7 +229,8 @@ def run_team(
     ----------
     system: whose nodes run, see ``push_bringup.systems``. believed: the scenario of the method; the
         world is drawn from it. limit: [s] of simulation.
-    meanwhile: called at every tick with the run, the time [s] and poses of object and robots.
+    meanwhile: called at every tick with the run, the time [s] and poses of object and robots,
+        before a frame of this tick is published.
     world: kind of world, that of the scenario where it is empty.
     mistake: makes of the scenario what the method believes instead; the world stays as drawn.
     """

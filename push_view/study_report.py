@@ -64,7 +64,11 @@ def grouping(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def measures(rows: Sequence[Mapping[str, Any]], by: str) -> list[dict[str, Any]]:
-    """By measure: its name, and by group the values and whether each trial succeeded."""
+    """By measure: its name, and by group the values and whether each trial succeeded.
+
+    A trial that crashed has no measures: the numbers of its row are what was asked of it.
+    """
+    rows = [row for row in rows if not row.get("crashed")]
     names = [k for row in rows for k, v in row.items() if _is_measure(k, v)]
     found = []
     for name in dict.fromkeys(names):

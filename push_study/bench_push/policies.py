@@ -1,10 +1,11 @@
-"""Two ways to clear an area: the planner of this project, and the policy GTSP of Bench-Push.
+"""Ways to clear an area: the planner of this project, and the policy GTSP of Bench-Push.
 
-Both see what benchnpin tells of an episode: the pose of the robot, rounded to 1 cm and 0.01 rad,
-and the outlines of the boxes.
+All see the pose of the robot, rounded by benchnpin to 1 cm and 0.01 rad, and the outlines of the
+boxes. The planner of this project is also told the walls and columns, which GTSP does not use.
 """
 
 import math
+from collections import deque
 from collections.abc import Generator
 from typing import Any
 
@@ -17,13 +18,15 @@ from push_planner.area_clearing import AreaClearing
 from push_planner.covering_tour import covering_tour
 from push_planner.sweeps import Area, Front, Sweep
 
-FRONT = Front(0.72, 0.72, 1.2)
-"""Of the robot of benchnpin's area clearing: a flat bumper, 2.4 m wide."""
+FRONT = Front(0.72, 0.72, 1.22)
+"""Of the robot of benchnpin's area clearing: a flat bumper, 2.4 m wide, with rounded corners."""
 _SPARE = 1.05  # [m] that a box needs beyond an edge
 _MOST = 60  # sweeps of an episode
 _AT = 0.03  # [m] from a point at which it is reached
 _TURNED = 0.012  # [rad], likewise
 _EASE = 0.2  # [s] in which errors are to vanish
+_PATIENCE = 15  # actions in which a robot that is not blocked moves by over 1 cm or 0.02 rad
+_BACK = 8  # actions for which one that is blocked drives back
 
 Action = tuple[float, float]
 """Speed and turn rate, of the greatest ones."""
@@ -44,18 +47,30 @@ def sweeping(room: dict[str, Any]) -> Policy:
         planned = planner.next_sweep(np.array(seen["pose"]), boxes)
         if planned is None:
             return
-        way, sweep, _ = planned
-        for point in way[:-1]:
-            seen = yield from robot.drive(seen, point, None)
-        seen = yield from robot.drive(seen, way[-1], sweep.heading)
-        seen = yield from robot.sweep(seen, sweep, area.outline)
+        way, sweep = planned
+        try:
+            for point in way[:-1]:
+                seen = yield from robot.drive(seen, point, None)
+            seen = yield from robot.drive(seen, way[-1], sweep.heading)
+            seen = yield from robot.sweep(seen, sweep, area.outline)
+        except _Blocked as blocked:
+            seen = yield from robot.back_off(blocked.seen)
+
+
+class _Blocked(Exception):
+    """The robot is told to move and does not. seen: what the room told last."""
+
+    def __init__(self, seen: dict[str, Any]) -> None:
+        super().__init__("the robot is blocked")
+        self.seen = seen
 
 
 class _Robot:
-    """Drives to points and along sweeps, and turns on the spot between."""
+    """Drives to points and along sweeps, and turns on the spot between; raises _Blocked."""
 
     def __init__(self, room: dict[str, Any]) -> None:
         self._speed, self._turn = room["speed"], room["turn"] / 2.0  # half, as benchnpin takes it
+        self._told, self._poses = (0.0, 0.0), deque([np.array(room["pose"])], _PATIENCE)
 
     def drive(
         self, seen: dict[str, Any], point: Array, then: float | None
@@ -81,7 +96,7 @@ class _Robot:
             nearest = min(nearest, distance)
             error = se2.wrap(math.atan2(away[1], away[0]) + back - seen["pose"][2])
             turn = 2.0 * error if distance > 5.0 * _AT else 0.0
-            seen = yield self._action(sign * distance / _EASE, turn)
+            seen = yield from self._act(sign * distance / _EASE, turn)
 
     def sweep(
         self, seen: dict[str, Any], sweep: Sweep, area: Array
@@ -99,46 +114,87 @@ class _Robot:
                 return seen
             beside = float((seen["pose"][:2] - sweep.start) @ across)
             course = sweep.heading - min(max(0.5 * beside, -0.3), 0.3)
-            seen = yield self._action(self._speed, 1.5 * se2.wrap(course - seen["pose"][2]))
+            turn = 1.5 * se2.wrap(course - seen["pose"][2])
+            seen = yield from self._act(self._speed, turn)
+
+    def back_off(self, seen: dict[str, Any]) -> Generator[Action, dict[str, Any], dict[str, Any]]:
+        """Undo the last command for a while."""
+        ahead, turn = self._told
+        for _ in range(_BACK):
+            seen = yield -ahead, -turn
+        self._poses.clear()
+        return seen
 
     def _face(
         self, seen: dict[str, Any], heading: float
     ) -> Generator[Action, dict[str, Any], dict[str, Any]]:
         while abs(error := se2.wrap(heading - seen["pose"][2])) > _TURNED:
-            seen = yield self._action(0.0, 0.9 * error / _EASE)
+            seen = yield from self._act(0.0, 0.9 * error / _EASE)
         return seen
 
-    def _action(self, speed: float, turn: float) -> Action:
-        """Of [m/s] and [rad/s]."""
+    def _act(self, speed: float, turn: float) -> Generator[Action, dict[str, Any], dict[str, Any]]:
+        """One action, of [m/s] and [rad/s]."""
         ahead, round_ = speed / self._speed, turn / self._turn
-        return min(max(ahead, -1.0), 1.0), min(max(round_, -1.0), 1.0)
+        self._told = min(max(ahead, -1.0), 1.0), min(max(round_, -1.0), 1.0)
+        seen = yield self._told
+        self._poses.append(np.array(seen["pose"]))
+        if len(self._poses) == _PATIENCE:
+            moved = np.ptp(self._poses, axis=0)
+            if moved[:2].max() < 0.015 and moved[2] < 0.025:  # one step of rounding is no motion
+                raise _Blocked(seen)
+        return seen
 
 
 def gtsp(room: dict[str, Any]) -> Policy:
     """The policy GTSP of Bench-Push, rebuilt: one push a box, the tour once at the start.
 
-    Pushes, costs and control are those of its published code (IvanIZ/BenchPush); its solver of the
-    travelling salesman's problem, GLNS, is replaced by an exact one. As there, turn rates are not
-    limited to the action space.
+    Pushes, costs and control are those of its published code (IvanIZ/BenchPush, e9f865b); its
+    solver of the travelling salesman's problem, GLNS, is replaced by an exact one. As there, the
+    tour is a closed one, of which the way back is not driven, and turn rates are not limited to the
+    action space.
     """
-    pushes = [np.array(push) for box in room["pushes"] for push in box]
-    takes = np.array([1 << k for k, box in enumerate(room["pushes"]) for _ in box])
-    heading = np.array([math.cos(room["pose"][2]), math.sin(room["pose"][2])])
-    first = [_gtsp_cost(np.array(room["pose"][:2]), heading, push) for push in pushes]
-    between = [[_gtsp_cost(p[-1], p[-1] - p[-2], q) for q in pushes] for p in pushes]
-    order, _ = covering_tour(np.array(first), np.array(between), takes)
-    seen = room
+    yield from _gtsp_tour(room, room)
+
+
+def gtsp_again(room: dict[str, Any]) -> Policy:
+    """GTSP, planned anew at the end of each tour, for the boxes that are still in the area."""
+    seen, area = room, np.array(room["area"])
+    while any(_in(area, box) for box in seen["boxes"]):
+        seen = yield from _gtsp_tour(room, seen)
+
+
+def _gtsp_tour(
+    room: dict[str, Any], seen: dict[str, Any]
+) -> Generator[Action, dict[str, Any], dict[str, Any]]:
+    """One tour through the boxes that are in the area."""
+    area, (x, y, theta) = np.array(room["area"]), seen["pose"]
+    inner = [p for p, b in zip(seen["pushes"], seen["boxes"], strict=True) if _in(area, b)]
+    pushes = [np.array(push) for box in inner for push in box]
+    takes = np.array([1 << k for k, box in enumerate(inner) for _ in box], dtype=np.int64)
+    here, heading = np.array([x, y]), np.array([math.cos(theta), math.sin(theta)])
+    first = [_gtsp_cost(here, heading, p[0], p[-1] - p[-2]) for p in pushes]
+    between = [
+        [_gtsp_cost(p[-1], p[-1] - p[-2], q[0], q[-1] - q[-2]) for q in pushes] for p in pushes
+    ]
+    home = [_gtsp_cost(p[-1], p[-1] - p[-2], here, heading) for p in pushes]
+    order = covering_tour(np.array(first), np.array(between), takes, np.array(home))
     for point in [pushes[k][end] for k in order for end in (0, -1)]:
         while np.hypot(*(point - seen["pose"][:2])) >= 0.4:
             away = point - seen["pose"][:2]
             error = se2.wrap(math.atan2(away[1], away[0]) - seen["pose"][2])
             seen = yield 1.0, error / 0.8 / room["turn"]
+    return seen
 
 
-def _gtsp_cost(here: Array, heading: Array, push: Array) -> float:
-    """Of the way to a push; that of the push itself is not counted."""
-    way = push[0] - here
-    turns = _between(heading, way) + _between(way, push[-1] - push[-2])
+def _in(area: Array, box: Any) -> bool:
+    return overlap(area, np.array(box))
+
+
+def _gtsp_cost(here: Array, heading: Array, there: Array, then: Array) -> float:
+    """Of the straight way between two points, and of the turns at both ends: from a direction, to
+    another one. Pushes themselves cost nothing."""
+    way = there - here
+    turns = _between(heading, way) + _between(way, then)
     return 0.5 * float(np.hypot(*way)) + 0.25 * math.pi * turns
 
 

@@ -11,18 +11,20 @@ paper are kept, for the robots are about as large.
 
 import math
 
+import numba
 import numpy as np
 
 from push_job.open_room import OpenRoom, open_room_method
 from push_model import se2
-from push_model.arrays import Array, Mask
-from push_model.outlines import distance, inside
+from push_model.arrays import Array, Mask, Rows
+from push_model.outlines import distance
 
 _AT = 0.1  # [m] from the object: at it
 _NEAR, _KEEP = 0.04, 0.2  # [m] between which a robot that moves along it stays
 _TIMEOUT, _WALK = 60.0, 5.0  # [s] at the object, and of a walk then
 _TURN = 2.0  # [rad/s] of a random walk's direction, standard deviation
 _DT = 0.02
+_LOOKS = 60
 
 
 class Occlusion:
@@ -49,10 +51,12 @@ class Occlusion:
             self._side = self._random.choice([-1.0, 1.0], n)
         local = se2.transform(se2.inverse(pose), points)
         gap = distance(self._outline, local) - self._arena.radius
-        near = np.hypot(*(local[:, None] - self._ring).transpose(2, 0, 1)).argmin(axis=1)
-        towards = (self._ring[near] - local) @ se2.rotation_matrix(float(pose[2])).T
+        towards = (self._ring[_nearest(local, self._ring)] - local) @ se2.rotation_matrix(
+            float(pose[2])
+        ).T
         towards /= np.maximum(np.hypot(*towards.T), 1e-9)[:, None]
-        hidden = self._hidden(pose, points)
+        target = se2.transform(se2.inverse(pose), self._arena.target[None])[0]
+        hidden = _hidden(self._outline, local, target)
         clear = self._clear(points, towards, gap)
         at = gap < _AT
         self._since = np.where(at, np.minimum(self._since, time), math.inf)
@@ -69,14 +73,6 @@ class Occlusion:
         speed: Array = self._arena.speed * moved / np.maximum(np.hypot(*moved.T), 1e-9)[:, None]
         return speed
 
-    def _hidden(self, pose: Array, points: Array) -> Mask:
-        """Whether the object is between a robot and the goal."""
-        part = np.linspace(0.0, 1.0, 60)[:, None, None]
-        line = (points + part * (self._arena.target - points)).reshape(-1, 2)
-        local = se2.transform(se2.inverse(pose), line)
-        within = inside(self._outline, local).reshape(60, -1)
-        return np.asarray(within.any(axis=0))
-
     def _clear(self, points: Array, towards: Array, gap: Array) -> Mask:
         """Whether no robot is between one and the object."""
         d = points[None] - points[:, None]
@@ -86,6 +82,40 @@ class Occlusion:
         between = (ahead > 0.5 * r) & (ahead < gap[:, None] + 2.0 * r) & (aside < r)
         clear: Mask = ~between.any(axis=1)
         return clear
+
+
+@numba.njit(cache=True)
+def _nearest(points: Array, ring: Array) -> Rows:
+    """``(n,)`` the number of the nearest one of points ``(m, 2)`` to each of ``(n, 2)``."""
+    found = np.zeros(len(points), dtype=np.intp)
+    for i in range(len(points)):
+        least = math.inf
+        for k in range(len(ring)):
+            away = math.hypot(points[i, 0] - ring[k, 0], points[i, 1] - ring[k, 1])
+            if away < least:
+                found[i], least = k, away
+    return found
+
+
+@numba.njit(cache=True)
+def _hidden(outline: Array, points: Array, target: Array) -> Mask:
+    """``(n,)`` whether the straight line from one of points ``(n, 2)`` to the target passes through
+    the outline, as far as some points of the line tell."""
+    found = np.zeros(len(points), dtype=np.bool_)
+    for i in range(len(points)):
+        for part in range(_LOOKS):
+            x = points[i, 0] + part / (_LOOKS - 1) * (target[0] - points[i, 0])
+            y = points[i, 1] + part / (_LOOKS - 1) * (target[1] - points[i, 1])
+            odd = False
+            for k in range(len(outline)):
+                ax, ay = outline[k]
+                bx, by = outline[(k + 1) % len(outline)]
+                if (ay > y) != (by > y) and x < ax + (y - ay) * (bx - ax) / (by - ay):
+                    odd = not odd
+            if odd:
+                found[i] = True
+                break
+    return found
 
 
 METHOD = open_room_method("occlusion", Occlusion)

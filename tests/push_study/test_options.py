@@ -51,6 +51,21 @@ def test_the_world_that_is_declared_is_the_one_that_is_taken(name, tmp_path):
 
 
 @pytest.mark.parametrize("name", NAMES)
+def test_commands_take_the_uncertainty_that_is_declared(name, tmp_path, monkeypatch):
+    taken = []
+
+    def spy(name, options):
+        taken.append(options.uncertainty)
+        return {"trials": [], "requested": 0}
+
+    monkeypatch.setattr("push_study.study.run_study", spy)
+    out = ["--out", str(tmp_path / "out")]
+    for command in [["experiment", name], *([[name]] if name == "leaderboard" else [])]:
+        main([*command, *out])
+    assert set(taken) == {experiment(name).OPTIONS.get("uncertainty", "mild")}
+
+
+@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("option", ["uncertainty", "world"])
 def test_an_option_that_is_not_used_is_refused_by_name(name, option, tmp_path, capsys):
     if option in experiment(name).OPTIONS:

@@ -113,6 +113,8 @@ def test_report_of_a_study(tmp_path, capsys):
     found = {m["name"]: m["groups"] for m in measures(rows, "scenario")}
     assert {k: len(v) for k, v in found["duration_s"].items()} == {"env0": 10, "env1": 10}
     assert len(found["position_error_m"]["env0"]) == 8 and "seed" not in found
+    crashed = {"scenario": "env0", "seed": 99, "success": False, "crashed": True, "limit": 60.0}
+    assert measures([*rows, crashed], "scenario") == measures(rows, "scenario")
     assert main(["report", str(folder)]) == 0 and "20 trials" in capsys.readouterr().out
     text = (folder / "report.html").read_text()
     outside, _ = parts(text)
