@@ -98,7 +98,7 @@ def test_a_trial_gives_its_domain_and_its_context_back(tmp_path, monkeypatch):
         (["--scenarios", "short,atlantis"], "atlantis"),
         (["--scenarios", "short,short"], "each once"),
         (["--scheduler", "tcp://nowhere:1"], "Dask"),
-        (["--uncertainty", "much"], "expected one of none, mild, hard"),
+        (["--uncertainty", "much"], "expected one of none, mild, contest, hard"),
     ],
 )
 def test_wrong_words_are_refused_before_anything_starts(tmp_path, capsys, words, what):
