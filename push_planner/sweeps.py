@@ -19,7 +19,8 @@ from push_model.outlines import overlap
 _BESIDE = (-0.7, -0.375, 0.0, 0.375, 0.7)
 """Where the centre of an object lies in a sweep that is laid out for it, as a share of half the
 front's width."""
-_BESIDE_SHIFTED = (0.0, -0.4, 0.4, -0.78, 0.78)  # likewise, of a shift
+_BESIDE_SHIFTED = tuple(0.1 * k for n in range(9) for k in sorted({-n, n}))
+"""Likewise, of a shift: near to each other, for a front that only just fits between columns."""
 _SHIFTS = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0)  # [m]
 _BEYOND = 0.08  # [m] beyond the edge that the front comes
 _TAKEN = 0.79  # of half the width, within which the centre of an object that is taken lies

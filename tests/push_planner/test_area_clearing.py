@@ -161,6 +161,17 @@ def test_a_shift_moves_a_second_box_only_where_no_other_shift_is_left(beside, to
         assert sum(met) == 1 + together
 
 
+@pytest.mark.parametrize("off", np.linspace(-0.6, 0.6, 13))
+def test_a_shift_is_found_wherever_a_box_lies_in_a_gap_that_is_hardly_wider_than_the_robot(off):
+    """Columns 2.8 m apart, for a robot that needs 2.56 m; two boxes in a row between them."""
+    column = BOX * 2.0
+    fixed = (column + [0.0, 2.4], column + [0.0, -2.4])
+    area = Area(CORNERS, (EDGES[0], EDGES[2]), np.array([8.0, 8.0]), fixed, 1.05)
+    boxes = [BOX + [-0.6, off], BOX + [0.6, off]]
+    assert not sweeps(area, FRONT, boxes, 0.12)
+    assert shifts(area, FRONT, boxes, 0.12)
+
+
 def test_a_box_that_nothing_brings_out_ends_the_plan():
     walls = tuple(np.array([a, a + 0.1, b + 0.1, b]) for a, b in EDGES)
     shut = Area(CORNERS, EDGES, np.array([8.0, 8.0]), walls, 1.05)
