@@ -120,13 +120,12 @@ def test_a_box_between_columns_is_first_brought_out():
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_the_way_to_a_sweep_goes_round_a_column_and_round_boxes_that_are_out(seed):
+def test_the_way_to_a_sweep_goes_round_a_column(seed):
     """All along the way, but for its end, where a sweep may begin beside the column."""
     random = np.random.default_rng(seed)
     column = BOX * 2.0 + random.uniform(-0.5, 0.5, 2)
-    out = BOX + [random.uniform(-1.0, 1.0), 6.0]
     area = Area(CORNERS, EDGES[:1], np.array([9.0, 9.0]), (column,), 1.05)
-    boxes = [BOX + [random.uniform(-1.0, 1.0), -3.4], out]
+    boxes = [BOX + [random.uniform(-1.0, 1.0), -3.4]]
     pose = np.array([random.uniform(-1.0, 1.0), 8.0, 0.0])
     way, sweep = AreaClearing(area, FRONT).next_sweep(pose, boxes)
     points = np.array([pose[:2], *way])
@@ -134,7 +133,6 @@ def test_the_way_to_a_sweep_goes_round_a_column_and_round_boxes_that_are_out(see
     dense = np.vstack([a + steps * (b - a) for a, b in itertools.pairwise(points)])
     clear = dense[np.hypot(*(dense - sweep.start).T) > 1.5]
     assert distance(column, clear).min() > 1.22 and not inside(column, clear).any()
-    assert distance(out, clear).min() > 0.7 and not inside(out, clear).any()
 
 
 @pytest.mark.parametrize(("beside", "together"), [(2.2, False), (1.2, True)])
