@@ -2,9 +2,8 @@
 
 The tour takes all objects that any sweep takes, and is planned anew before every sweep, from the
 poses that are seen then. Its cost is the way that the robot drives, and a little for turns on the
-spot. Between sweeps the robot drives over a
-lattice. Places near objects cost more, but are not forbidden: where there is no way round, the
-robot moves objects aside.
+spot. Between sweeps the robot drives over a lattice. Places near objects cost more, but are not
+forbidden: where there is no way round, the robot moves objects aside.
 """
 
 from collections.abc import Sequence

@@ -31,8 +31,8 @@ class Contact:
 class BodyContacts(Sequence[Contact]):
     """Contacts as columns that can also be read one by one.
 
-    body_a, body_b: ``(n,)`` names. position, normal, force: ``(n, 3)``. duty: ``(n,)``, see
-    Contact.
+    body_a, body_b: ``(n,)`` names. position [m], normal, force [N]: ``(n, 3)``, world frame. duty:
+    ``(n,)``. What they are is told in Contact.
     """
 
     __slots__ = ("body_a", "body_b", "duty", "force", "normal", "position")
