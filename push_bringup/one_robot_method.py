@@ -27,7 +27,7 @@ from push_model.specs import ObjectSpec, RobotSpec
 from push_model.stick_certificate import ContactBelief
 from push_mpc import LtvMpc, MpcSettings, TrackerSettings, TrajectoryTracker
 from push_mpc.tick_report import tick_report
-from push_planner import PlannerSettings, PlanningFailed
+from push_planner import SLICE, PlannerSettings, PlanningFailed
 from push_planner.refusal import check_room
 from push_supervisor import (
     Displacement,
@@ -51,6 +51,7 @@ SECTIONS: dict[str, type[Any]] = {
     "tracker": TrackerSettings,
 }
 _POINTS = 10  # of a trajectory, of which a report shows one
+_LONGEST = 0.05  # [s] from one frame to the next that is made use of for planning
 
 
 class OneRobotMethod:
@@ -80,6 +81,7 @@ class OneRobotMethod:
         self._question: Question | None = None  # a command that waits, or is worked on
         self._repair: commands.Repair | None = None  # likewise, while the robot pushes
         self._not_before, self._looked = 0.0, math.nan
+        self._slices = 1  # of planning, in this frame
 
     def _around(self, robot: RobotSpec, item: ObjectSpec) -> Surroundings:
         near = Surroundings(robot, item, {}, self._settings)  # other bodies come with each frame
@@ -127,7 +129,9 @@ class OneRobotMethod:
 
     def step(self, seen: Seen, belief: Belief) -> Told:
         """See Method: a tick of the tracker, then what the state machine wants next. A plan is made
-        in slices, one a frame."""
+        in slices: one a frame while the robot pushes, else as many as fit between two frames."""
+        elapsed = 0.0 if self._seen is None else seen.time - self._seen.time
+        self._slices = max(1, round(min(elapsed, _LONGEST) / SLICE))
         self._seen = seen
         self._take_up(belief)
         if self._goal is not None:
@@ -201,7 +205,8 @@ class OneRobotMethod:
             case commands.Repair():
                 event = self._plans.repair(question, self._near, seen)
             case commands.MakePlan():
-                event = self._plans.plan(question, seen.robots[self._name], seen)
+                robot = seen.robots[self._name]
+                event = self._plans.plan(question, robot, seen, slices=self._slices)
             case commands.FindPath():
                 event = self._plans.way(question, seen.robots[self._name], seen, self._near)
             case _:

@@ -90,15 +90,21 @@ class Plans:
         return event
 
     def plan(
-        self, command: commands.MakePlan, robot: Array, seen: Seen, on_side: int | None = None
+        self,
+        command: commands.MakePlan,
+        robot: Array,
+        seen: Seen,
+        on_side: int | None = None,
+        slices: int = 1,
     ) -> events.Event | None:
-        """Do one slice of the work on a plan; the plan, or why there is none, after the last."""
+        """Do some slices of the work on a plan; the plan, or why there is none, after the last."""
         if self._work is None:
             self._draws += command.preemptive
             self._best = None
             self._work = self._begin(command, seen, robot, on_side)
         try:
-            self._best = next(self._work).best
+            for _ in range(slices):
+                self._best = next(self._work).best
             return None
         except StopIteration:
             assert self._best is not None

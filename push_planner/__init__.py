@@ -7,6 +7,7 @@ from push_planner.planner import PushPlanner
 from push_planner.preemptive import plan_after_preemptive_push, preemptive_pushes
 from push_planner.push_curve import PushCurve, shortest_push_curve
 from push_planner.push_plan import (
+    SLICE,
     PlanError,
     PlanningFailed,
     PlanStatistics,
@@ -20,6 +21,7 @@ from push_planner.settings import PlannerSettings
 from push_planner.warm_up import warm_up
 
 __all__ = [
+    "SLICE",
     "DistanceField",
     "NoRobotPath",
     "PlanError",

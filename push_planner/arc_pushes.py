@@ -44,7 +44,7 @@ def pushes_over_arcs(
         search = ArcSearch(scene, ends, begins, backward, bound, nodes, first)
         yield from search.run()
         if search.cost < math.inf:
-            found = _pushes_along(scene, *search.path(), robot, statistics, on_side)
+            found = yield from _pushes_along(scene, *search.path(), robot, statistics, on_side)
             if found is not None and found[1] < bound:
                 best, bound = found
             yield
@@ -58,8 +58,8 @@ def _pushes_along(
     robot: Array | None,
     statistics: SearchStatistics,
     on_side: int | None = None,
-) -> tuple[tuple[PushStep, ...], float] | None:
-    """Pushes along a path and their cost [s]; None if one is not possible.
+) -> Generator[None, None, tuple[tuple[PushStep, ...], float] | None]:
+    """Pushes along a path and their cost [s], in slices; None if one is not possible.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def _pushes_along(
         return None
     for last in (*changes.tolist(), len(poses) - 1):
         side = int(sides[first])
-        run = _cheapest(graph, first, last, side, statistics)
+        run = yield from _cheapest(graph, first, last, side, statistics)
         if run is None:
             return None
         steps += run
@@ -91,9 +91,9 @@ def _pushes_along(
 
 def _cheapest(
     graph: PushGraph, first: int, last: int, side: int, statistics: SearchStatistics
-) -> list[PushStep] | None:
+) -> Generator[None, None, list[PushStep] | None]:
     """The cheapest pushes on a side from one pose of a path to another one, through some of those
-    between them."""
+    between them. Yields after the pushes that begin at each of them."""
     count = last - first
     best = np.full(count + 1, math.inf)
     best[0] = 0.0
@@ -105,6 +105,7 @@ def _cheapest(
             step = graph.push(first + k, first + k + span, side, statistics)
             if step is not None and best[k] + step.time + _EACH < best[k + span]:
                 best[k + span], into[k + span] = best[k] + step.time + _EACH, (k, step)
+        yield
     result: list[PushStep] = []
     k = count
     while k > 0:

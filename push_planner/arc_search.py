@@ -41,7 +41,7 @@ _FAR = 4  # and from one in so many of the others
 _BEND_COST = (
     1.03  # time of the push to the target, as a multiple of that of a straight one: a guess
 )
-_SLICE = 4000  # nodes between two reports
+_SLICE = 400  # nodes between two reports
 
 
 class _Target(NamedTuple):

@@ -8,7 +8,7 @@ The poses at which the side changes are moved first, by a search near the poses 
 smaller curvature limits. Then every push takes the widest bends that cost at most so much more.
 """
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 
 import numpy as np
 
@@ -37,8 +37,8 @@ def gentler(
     random: np.random.Generator,
     statistics: SearchStatistics,
     on_side: int | None = None,
-) -> tuple[PushStep, ...] | None:
-    """Pushes from the same start to the same goal with wider bends.
+) -> Generator[None, None, tuple[PushStep, ...] | None]:
+    """Search in slices for pushes from the same start to the same goal with wider bends.
 
     Parameters
     ----------
@@ -51,7 +51,8 @@ def gentler(
     steps: Sequence[PushStep] = given
     limit = (1.0 + scene.settings.easing) * cost
     for part in _SEARCHED:
-        found = _near(scene.bending_less(part), steps, limit, robot, random, statistics, on_side)
+        narrow = scene.bending_less(part)
+        found = yield from _near(narrow, steps, limit, robot, random, statistics, on_side)
         if found is not None:
             steps, cost = found
             break
@@ -59,8 +60,8 @@ def gentler(
     left = limit / cost  # of what a push may take longer
     for number, step in enumerate(steps):
         leaving = scene.leaving(step.object_start) if number == 0 else np.inf
-        wide = _widest(scene, step, left * step.time, leaving, statistics)
-        result.append(wide)
+        result.append(_widest(scene, step, left * step.time, leaving, statistics))
+        yield
     changed = any(new is not old for new, old in zip(result, given, strict=False))
     return tuple(result) if changed else None
 
@@ -82,7 +83,7 @@ def _near(
     random: np.random.Generator,
     statistics: SearchStatistics,
     on_side: int | None,
-) -> tuple[tuple[PushStep, ...], float] | None:
+) -> Generator[None, None, tuple[tuple[PushStep, ...], float] | None]:
     """The cheapest pushes by way of poses near those of a plan, below a cost [s]."""
     found, cost = None, (1.0 + _FIRST) * limit
     start, goal = steps[0].object_start, steps[-1].object_end
@@ -90,9 +91,9 @@ def _near(
     for size in _SIZES if between else ():
         poses = nearby(np.array(between), _POSES, size, random).free(scene)
         graph = PushGraph(scene, start, goal, poses, np.inf, robot, on_side=on_side)
+        yield
         search = PushSearch(graph, cost, 1.0, scene.settings.max_expansions)
-        for _ in search.run(statistics):
-            pass
+        yield from search.run(statistics)
         if search.solution is not None:
             found, cost = search.solution, search.cost
             between = [step.object_end for step in found[:-1]]

@@ -55,6 +55,7 @@ from push_ros.scheduling import Urgency
 from push_ros.validation import FRAME, InvalidMessage, planar_pose
 from push_scenario.scenario import Scenario, load_scenario
 
+_AT_ONCE = 2  # slices: in lockstep at 100 Hz as many as fit between two frames
 _SIGN_OF_LIFE = 0.5  # [s] wall time between feedback messages at most
 
 
@@ -82,7 +83,7 @@ class PlannerNode(Node):
         self._work: Iterator[Progress] | None = None
         self._best: PushPlan | None = None
         self._under_way: list[PushSegment] = []  # at most one, with which the plan begins
-        self._queued = False  # whether a slice waits for its turn
+        self._queued = False  # whether slices wait for their turn
         self._draws = 0  # requests for pre-emptive pushes: each draws others
         self.plans = self.failures = 0
         self.last_time = 0.0  # [s] wall time of the last plan
@@ -250,19 +251,24 @@ class PlannerNode(Node):
         return plan_among_bodies(planner, start, goal, circles, draw, robot, *sides)
 
     def _continue(self) -> None:
-        """Queue the next slice behind whatever else the executor has to do."""
+        """Queue the next slices behind whatever else the executor has to do."""
         if not self._queued:
             assert self.executor is not None
             self._queued = True
-            self.executor.create_task(self._on_slice)
+            self.executor.create_task(self._on_slices)
 
-    def _on_slice(self) -> None:
+    def _on_slices(self) -> None:
         self._queued = False
-        if self._work is None:
-            return
+        for _ in range(_AT_ONCE):
+            if self._work is not None:
+                self._slice(self._work)
+        if self._work is not None:
+            self._continue()
+
+    def _slice(self, work: Iterator[Progress]) -> None:
         cpu = time.thread_time()
         try:
-            progress = next(self._work)
+            progress = next(work)
         except StopIteration:
             self._succeed()
             return
@@ -284,8 +290,6 @@ class PlannerNode(Node):
             self._server.feedback(told)
         if self._best is not None and 0.0 < self._request.time_budget < elapsed:
             self._succeed()
-            return
-        self._continue()
 
     def _publish(self, plan: PushPlan) -> None:
         robot, spec = self._scenario.robot(self._request.robot)

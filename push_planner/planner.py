@@ -35,6 +35,7 @@ from push_planner.thesis_search import ThesisSearch, poses_on
 from push_planner.work import Guides, Work
 
 _Ends = tuple[Array, Array]
+_Pushes = tuple[PushStep, ...]
 _WORTH = 0.002  # of the cost that a further plan must save
 _NEAR_BOUND = 0.05  # of the lower bound: a plan so near to it needs no search over arcs
 _NEARBY = 40  # poses about each one that an improvement moves
@@ -136,8 +137,7 @@ class PushPlanner:
         if settings.planner == "lazy":
             best = yield from self._improved(best, ends, guides, bound.ends, work)
         if settings.planner == "lazy" and settings.easing > 0.0:
-            yield Progress("wider bends", best)
-            best = self._eased(best, work)
+            best = yield from self._eased(best, work)
         statistics = work.counted(best.guide)
         least = min(bound.value, best.cost)
         yield Progress("done", replace(best, cost_bound=least, statistics=statistics))
@@ -155,6 +155,7 @@ class PushPlanner:
             around = settings.manoeuvres * attempt
             graph = self._graph(start, goal, guide, attempt, count, around, work)
             work.poses += len(graph.poses) - 2
+            yield Progress("candidate poses", None)
             if not graph.leave(work.statistics, enough=1):
                 continue
             work.graph, work.ways_out = graph, True
@@ -162,6 +163,7 @@ class PushPlanner:
             for weight in (1.0, settings.heuristic_weight):
                 if weight > 1.0:
                     graph.leave(work.statistics)
+                    yield Progress("pushes from the start", None)
                 search = PushSearch(graph, np.inf, weight, work.effort())
                 for _ in search.run(work.statistics):
                     yield Progress(f"push search {attempt + 1}", None)
@@ -208,6 +210,8 @@ class PushPlanner:
                     yield Progress("improving", best)
                     continue
             if number == 0:
+                for _ in guides.rest():
+                    yield Progress("guide path", best)
                 count, most = settings.improvement_poses, settings.improvement_expansions // 2
                 graph = self._graph(start, goal, guides.all()[-1], 1, count, 0, work)
                 bound = (1.0 - _WORTH) * self._cost(best.segments, work, _HASTE)
@@ -241,18 +245,14 @@ class PushPlanner:
         bound, nodes = (1.0 - _WORTH) * best.cost, self.settings.arc_nodes
         given = work.robot, nodes, work.statistics, work.on_side
         search = pushes_over_arcs(self.scene, run_ends, bound, *given)
-        while True:
-            try:
-                next(search)
-            except StopIteration as end:
-                found = end.value and self._assemble(end.value, goal, best.guide, work)
-                return best if found is None else found
-            yield Progress("search over arcs", best)
+        found = yield from _reported(search, "search over arcs", best)
+        return best if found is None else self._assemble(found, goal, best.guide, work)
 
-    def _eased(self, best: PushPlan, work: Work) -> PushPlan:
+    def _eased(self, best: PushPlan, work: Work) -> Generator[Progress, None, PushPlan]:
         """The best plan with wider bends, or itself."""
         given = work.robot, work.random, work.statistics, work.on_side
-        found = gentler(self.scene, best.segments, best.cost, *given)
+        search = gentler(self.scene, best.segments, best.cost, *given)
+        found = yield from _reported(search, "wider bends", best)
         return best if found is None else self._assemble(found, best.goal, best.guide, work)
 
     def _cost(
@@ -374,3 +374,16 @@ class PushPlanner:
         clearance, cost = min(s.clearance for s in segments), self._cost(segments, work)
         least, counted = min(work.least, cost), work.counted(guide)
         return PushPlan(goal, segments, cost, least, clearance, guide, counted)
+
+
+def _reported(
+    search: Generator[None, None, _Pushes | None], stage: str, best: PushPlan
+) -> Generator[Progress, None, _Pushes | None]:
+    """The result of a search in slices, each of which is reported."""
+    while True:
+        try:
+            next(search)
+        except StopIteration as end:
+            found: _Pushes | None = end.value
+            return found
+        yield Progress(stage, best)

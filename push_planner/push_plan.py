@@ -66,6 +66,11 @@ class PushPlan:
         return sum(s.length for s in self.segments)
 
 
+SLICE = 0.005
+"""[s] that a slice of planning takes about: half of them 4 ms or less, one in a hundred more than
+20 ms."""
+
+
 @dataclass(frozen=True)
 class Progress:
     """Where planning stands: what it is doing and the best plan so far."""

@@ -73,8 +73,13 @@ class Guides:
             )
         return self._found[number % len(self._found)]
 
+    def rest(self) -> Iterator[None]:
+        """Make those that have not been asked for; yields after each."""
+        while self._another():
+            yield
+
     def all(self) -> list[GuidePath]:
         """Those that there are."""
-        while self._another():
+        for _ in self.rest():
             pass
         return self._found

@@ -103,8 +103,9 @@ class MethodNode(Node):
         self._seen: Seen | None = None
         self._missing = 0.0  # [s] of pose time without the object
         self._stamp, self._reported = Header().stamp, -math.inf
-        self.planning_time = 0.0
-        """[s] CPU time that the method's planning has taken so far."""
+        self.planning_time = self.planning_delay = 0.0
+        """[s] CPU time that the method's planning has taken so far; by how much it took longer than
+        from one frame to the next, in sum."""
         self._diagnostics = Diagnostics(self, names, self._state)
         self.beliefs = BeliefFeed(self, names, scenario, self._diagnostics)
         self.partners = hosting.attach(self)
@@ -322,6 +323,7 @@ class MethodNode(Node):
         told = method.step(seen, self.beliefs.current)
         cost = time.thread_time() - began
         self.planning_time += told.planning
+        self.planning_delay += max(0.0, told.planning - frame.elapsed)
         if seen.time - self._reported >= _REPORTS - 1e-9:
             self._report(method, seen, cost)
         return told

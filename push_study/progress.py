@@ -1,11 +1,15 @@
 """How far a study is: a bar on a terminal, plain lines elsewhere."""
 
+import dataclasses
 import sys
 import time
+from pathlib import Path
 from typing import Any, TextIO
 
 _WIDTH = 30  # [characters] of the bar
 _CLEAR = "\r\033[K"
+_ALIKE = {"scenario", "seed", "out", "uncertainty", "world", "digest", "source"}
+"""Fields of tasks that a title tells in a way of its own, or not at all."""
 
 
 class Progress:
@@ -30,14 +34,14 @@ class Progress:
             self._out.write(_CLEAR)
         self._out.flush()
 
-    def tell(self, row: dict[str, Any]) -> None:
-        """A trial has ended."""
+    def tell(self, title: str, row: dict[str, Any]) -> None:
+        """A trial has ended. title: which one, see ``title``."""
         self._done += 1
         self._wins += bool(row.get("success"))
         mark = "ok  " if row.get("success") else "FAIL"
         self._out.write(
             f"{_CLEAR if self._bar else ''}[{self._kept + self._done:3d}/{self._total}] {mark} "
-            f"{row.get('scenario', '')} seed {row.get('seed')}: {row.get('reason', '')} "
+            f"{title}{': ' if row.get('reason') else ''}{row.get('reason', '')} "
             f"({time.monotonic() - self._started:.0f} s)\n"
         )
         self._draw()
@@ -53,3 +57,17 @@ class Progress:
             bar = "█" * full + "░" * (_WIDTH - full)
             self._out.write(f"{_CLEAR}{bar} {done}/{self._total}, {self._wins} succeed{left}")
         self._out.flush()
+
+
+def title(task: Any) -> str:
+    """Which trial a task of a study is: its names (scenario, method, object, ...), counts, seed."""
+    told = [Path(task.scenario).stem] if hasattr(task, "scenario") else []
+    for field in dataclasses.fields(task):
+        value = getattr(task, field.name)
+        if field.name in _ALIKE or isinstance(value, bool):
+            continue
+        if isinstance(value, str) and value:
+            told.append(value)
+        elif isinstance(value, int):
+            told.append(f"{field.name.replace('_', ' ')} {value}")
+    return ", ".join([*told, f"seed {task.seed}"])

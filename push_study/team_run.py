@@ -91,9 +91,11 @@ class TeamTrace:
 class Outcome:
     """What became of a task.
 
-    reached: targets; code, reason: of the end; seconds: of simulation, which stands still while a
-    plan is made; planning: [s] CPU time of that; error: [m], [rad] of the object from the goal at
-    the end, from ground truth. drawn: what of the world was not as believed.
+    reached: targets; code, reason: of the end; seconds: of simulation, in which a frame comes only
+    when the one before has been answered; planning: [s] CPU time of plans; delay: [s] of it that is
+    longer than from a frame to the next, or is spent in a node of its own; error: [m], [rad] of the
+    object from the goal at the end, from ground truth. drawn: what of the world was not as
+    believed.
     """
 
     reached: int
@@ -101,6 +103,7 @@ class Outcome:
     reason: str
     seconds: float
     planning: float
+    delay: float
     error: tuple[float, float]
     trace: TeamTrace
     drawn: Row
@@ -116,8 +119,8 @@ class Outcome:
 
     @property
     def charged(self) -> float:
-        """[s] of simulation and planning together: what a user waits."""
-        return self.seconds + self.planning
+        """[s] of simulation and of what planning adds to it: what a user waits."""
+        return self.seconds + self.delay
 
     def row(self) -> Row:
         """The measures that every study of a team has."""
@@ -290,15 +293,12 @@ def _run(
         except GoalRefused as refusal:
             error = _errors(watcher.trace.now[0], task.goal)
             return Outcome(
-                0, refusal.code, f"refused: {refusal}", 0.0, 0.0, error, watcher.trace, drawn
+                0, refusal.code, f"refused: {refusal}", 0.0, 0.0, 0.0, error, watcher.trace, drawn
             )
         node.take_task(task)
         ended = run.spin_until(lambda: not node.busy, limit)
         seconds = run.bridge.time - begin
-        planner = run.planner
-        planning = node.planning_time + float(getattr(planner, "planning_time", 0.0)) * (
-            planner is not node
-        )
+        apart = 0.0 if run.planner is node else float(getattr(run.planner, "planning_time", 0.0))
         status = node.status
         code = JobError(status.code) if ended else JobError.EXECUTION_FAILED
         reason = status.reason if ended else f"no end within {limit:.0f} s: {status.reason}"
@@ -312,7 +312,8 @@ def _run(
             code,
             reason,
             seconds,
-            planning,
+            node.planning_time + apart,
+            node.planning_delay + apart,
             error,
             watcher.trace,
             drawn,

@@ -17,7 +17,7 @@ from typing import Any
 
 from push_study.cluster import cluster_results
 from push_study.pool import Row, Trial, local_results
-from push_study.progress import Progress
+from push_study.progress import Progress, title
 
 __all__ = ["Row", "Trial", "identity", "read_journal", "run_trials"]
 
@@ -77,7 +77,7 @@ def run_trials(
                 rows[index] = row
                 file.write(json.dumps({"task": keys[index], "row": row}) + "\n")
                 file.flush()
-                progress.tell(row)
+                progress.tell(title(tasks[index]), row)
         except KeyboardInterrupt:
             print(f"interrupted: {len(rows)} of {len(tasks)} trials are kept", file=sys.stderr)
     return [rows[i] for i in sorted(rows)]

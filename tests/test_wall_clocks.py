@@ -62,7 +62,7 @@ DECIDES_NOTHING = {
     "push_planner/node.py:PlannerNode._begin": COST,
     "push_planner/rearranger_node.py:RearrangerNode.__init__": LIVE,
     "push_planner/rearranger_node.py:RearrangerNode._on_slice": COST,
-    "push_planner/node.py:PlannerNode._on_slice": "signs of life, which nobody waits for in "
+    "push_planner/node.py:PlannerNode._slice": "signs of life, which nobody waits for in "
     "lockstep; a time budget only where the asker gives one, in wall time by its definition",
     "push_planner/node.py:PlannerNode._now": "stamps of messages",
     "push_planner/node.py:PlannerNode._succeed": COST,

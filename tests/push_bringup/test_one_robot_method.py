@@ -12,6 +12,7 @@ from push_model.belief import Belief, Interval
 from push_model.jobs import JobError, JobPhase
 from push_model.settings import SettingsError
 from push_mpc.believed_push import Unstable
+from push_planner import PushPlanner
 from push_scenario.scenario import load_scenario
 from push_supervisor import SupervisorSettings
 from sim_bridge.planar_world import PlanarWorld
@@ -38,13 +39,13 @@ class Notebook:
         robots = {} if self.hidden else {self.robot: poses[self.robot]}
         return Seen(self.time, poses[self.item], robots, **more)
 
-    def step(self, **more):
-        self.time += 0.01
+    def step(self, period=0.01, **more):
+        self.time += period
         told = self.method.step(self.seen(**more), self.belief)
         self.planning += told.planning
         self.commands = told.commands.get(self.robot, (0.0, 0.0))
         self.world.command(self.robot, *self.commands)
-        self.world.step(round(0.01 / self.world.time_step))
+        self.world.step(round(period / self.world.time_step))
 
     def until(self, condition, limit=NEVER):
         end = self.time + limit
@@ -280,6 +281,50 @@ def moved_goal(seed, supervisor=None, near=math.inf):
             reasons.append(book.method.status.reason)
         book.step()
     return book, reasons
+
+
+def slices_of(monkeypatch):
+    """A list to which each slice of a plan adds its stage."""
+    stages, whole = [], PushPlanner.plan
+
+    def plan(*args, **kwargs):
+        for progress in whole(*args, **kwargs):
+            stages.append(progress.stage)
+            yield progress
+
+    monkeypatch.setattr(PushPlanner, "plan", plan)
+    return stages
+
+
+@pytest.mark.parametrize(("period", "most"), [(0.01, 2), (0.02, 4), (0.04, 8), (0.2, 10)])
+def test_between_frames_that_are_farther_apart_more_slices_of_a_plan_are_done(
+    period, most, monkeypatch
+):
+    book = Notebook("env1-target1")
+    stages, counts = slices_of(monkeypatch), []
+    book.begin()
+    while not book.method.machine.segments:
+        before = len(stages)
+        book.step(period)
+        counts.append(len(stages) - before)
+    assert sum(counts) == len(stages) > 3 * most
+    assert counts[0] == 1, "it is not known yet how far apart frames are"
+    assert set(counts[1:-1]) == {most} and counts[-1] <= most
+
+
+def test_while_the_robot_pushes_a_frame_has_one_slice(monkeypatch):
+    book = Notebook("env1-target1")
+    book.pushing()
+    stages, counts = slices_of(monkeypatch), []
+    book.goal = book.goal + [-0.05, 0.03, 0.1]
+    book.begin()
+    book.step()
+    assert book.method.machine.repairing
+    while book.method.machine.repairing:
+        before = len(stages)
+        book.step()
+        counts.append(len(stages) - before)
+    assert len(counts) > 20 and max(counts) == 1
 
 
 @pytest.mark.long

@@ -206,11 +206,12 @@ def test_what_is_too_heavy_is_not_planned(ros):
 
 
 def test_a_flood_of_requests_leaves_the_last_one_and_one_chain_of_slices(client):
-    """Each slice queues one: with two, each request would take two turns of the executor."""
+    """Slices queue the next ones once: with two chains, each request would take two turns of the
+    executor."""
     handles = [client.send(GOAL + [0.0, 0.02 * k, 0.0]) for k in range(-5, 6)]
     slices = []
-    step = client.planner._on_slice
-    client.planner._on_slice = lambda: (slices.append(client.planner._queued), step())
+    step = client.planner._on_slices
+    client.planner._on_slices = lambda: (slices.append(client.planner._queued), step())
     results = [client.result(handle) for handle in handles]
     assert [r.error_code for r in results] == [R.CANCELED] * 10 + [R.NONE]
     assert results[-1].plan.goal.position.y == pytest.approx(0.3)

@@ -1,3 +1,4 @@
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from push_planner import (
     shortest_push_curve,
 )
 from push_planner.guide_path import guide_paths, path_cost, shortest_path
+from push_planner.push_graph import PushGraph
 from push_planner.push_reference import joined
 from push_planner.rough_cost import guessed_length
 from push_planner.shortest_chord import chord, shortest_chords
@@ -101,6 +103,23 @@ def test_plans_only_get_better(planner):
     *cheaper, final = costs
     assert cheaper and all(b <= a for a, b in zip(cheaper, cheaper[1:], strict=False))
     assert final <= (1.0 + planner.settings.easing) * cheaper[-1], "for wider bends"
+
+
+@pytest.mark.parametrize("goal", [(0.9, -0.5, 1.0), (1.3, 0.75, np.pi / 2)])
+def test_no_slice_after_the_first_plan_tries_many_pushes(planner, goal, monkeypatch):
+    """Slices are done while a robot pushes."""
+    tried, one = [0], PushGraph._try
+    monkeypatch.setattr(
+        PushGraph, "_try", lambda *args: (tried.__setitem__(0, tried[0] + 1), one(*args))[1]
+    )
+    counts = Counter()
+    before = 0
+    for progress in planner.plan(START, np.array(goal)):
+        if progress.best is not None:
+            assert tried[0] - before <= 30, progress.stage
+            counts[progress.stage.split(",")[0]] += 1
+        before = tried[0]
+    assert tried[0] > 300 and min(counts["search over arcs"], counts["wider bends"]) > 20, counts
 
 
 def test_change_of_side_where_one_push_cannot_do(robot, box):

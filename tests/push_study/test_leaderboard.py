@@ -201,7 +201,7 @@ def test_who_touches_an_obstacle_has_not_reached_the_goal(name, method, monkeypa
 
     def told(ticks):
         trace = TeamTrace(obstacle_ticks=ticks, ways=list(np.hstack([ways[:, None], robots])))
-        outcome = Outcome(1, JobError.NONE, "", 30.0, 1.0, (0.001, 0.01), trace, {})
+        outcome = Outcome(1, JobError.NONE, "", 30.0, 1.0, 1.0, (0.001, 0.01), trace, {})
         monkeypatch.setattr("push_study.leaderboard.match.run_team", lambda *_, **__: outcome)
         return play(Match(name, 1, "", method, "planar", "mild"))
 

@@ -327,7 +327,7 @@ def test_a_goal_that_is_reached_with_a_collision_is_no_success(
     ticks, success, tmp_path, monkeypatch
 ):
     trace = TeamTrace(collision_ticks=ticks)
-    ended = Outcome(1, JobError.NONE, "done", 60.0, 1.0, (1e-3, 0.01), trace, {})
+    ended = Outcome(1, JobError.NONE, "done", 60.0, 1.0, 1.0, (1e-3, 0.01), trace, {})
     monkeypatch.setattr(group_goals, "run_team", lambda *args: ended)
     row = group_goals.trial(group_goals.GoalTask("open", 23, str(tmp_path), 3, 0, "planar", "none"))
     assert row["success"] is success and row["collision_ticks"] == ticks

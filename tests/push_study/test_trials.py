@@ -13,7 +13,10 @@ from pathlib import Path
 
 import pytest
 
-from push_study.progress import Progress
+from push_study.experiments.group_goals import GoalTask
+from push_study.experiments.own_sensing import SensingTask
+from push_study.leaderboard.match import Match
+from push_study.progress import Progress, title
 from push_study.summary import aggregate
 from push_study.trials import identity, read_journal, run_trials
 
@@ -87,15 +90,25 @@ class Terminal(io.StringIO):
 
 
 def test_a_bar_on_a_terminal_and_plain_lines_elsewhere():
-    row = {"scenario": "s", "seed": 3, "success": True, "reason": "there"}
+    row = {"success": True, "reason": "there"}
     for out in (Terminal(), io.StringIO()):
         with Progress(4, 1, out) as progress:
-            progress.tell(row)
-            progress.tell({**row, "success": False})
+            progress.tell("s, seed 3", row)
+            progress.tell("s, seed 3", {"success": False})
         text = out.getvalue()
         assert "1 of 4 trials are kept" in text
-        assert "[  2/4] ok   s seed 3: there" in text and "[  3/4] FAIL" in text
+        assert "[  2/4] ok   s, seed 3: there (" in text and "[  3/4] FAIL s, seed 3 (" in text
         assert ("3/4, 1 succeed" in text and "\r" in text) == out.isatty()
+
+
+def test_a_trial_is_told_by_what_tells_it_from_others():
+    match = Match("env1", 3, "/out", "one robot", "planar", "mild", "digest")
+    assert title(match) == "env1, one robot, seed 3"
+    sensing = SensingTask("transport_middle", 5, "square", "planar", "mild")
+    assert title(sensing) == "transport_middle, square, seed 5"
+    assert title(GoalTask("a/b.yaml", 1, "/out", 4, 3, "planar", "none")) == (
+        "b, robots 4, sides 3, seed 1"
+    )
 
 
 @pytest.mark.live

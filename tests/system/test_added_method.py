@@ -3,6 +3,7 @@ and in a bag, without an edit anywhere else.
 """
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,8 @@ from push_view.report import write_report
 from push_view.report_panel import LivePanel
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "examples"))
+import bulldozer
+
 NAME = "bulldozer:METHOD"
 
 
@@ -73,6 +76,19 @@ def test_a_study_runs_it_in_its_uncertainty():
     assert outcome.success and 0.0 < outcome.error[0] < 0.06 and outcome.seconds > 3.0
     assert outcome.trace.phases["shove"] == pytest.approx(outcome.seconds, abs=0.2)
     assert len(outcome.trace.ways) == pytest.approx(outcome.seconds / 0.2, abs=2)
+
+
+def test_planning_is_charged_where_it_takes_longer_than_to_the_next_frame(monkeypatch):
+    whole, costs = bulldozer.Bulldozer.step, iter([0.003] * 5 + [0.25])
+
+    def step(self, seen, belief):
+        return replace(whole(self, seen, belief), planning=next(costs, 0.0))
+
+    monkeypatch.setattr(bulldozer.Bulldozer, "step", step)
+    outcome = run_team(NAME, scenario(), Task((GOAL,)), uncertainty("mild"), 1, 60.0)
+    assert outcome.success and outcome.planning == pytest.approx(0.265)
+    assert outcome.delay == pytest.approx(0.25 - 0.01, abs=1e-6), "frames come at 100 Hz"
+    assert outcome.charged == outcome.seconds + outcome.delay
 
 
 def test_its_settings_and_its_team_are_checked_before_anything_starts(capsys):
