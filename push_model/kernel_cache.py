@@ -1,10 +1,17 @@
-"""When compiled kernels are compiled anew.
+"""When compiled kernels are compiled anew, and what they share.
 
 numba keeps the machine code of a kernel in a file, until the source file of this kernel changes.
 It does not see changes in other files on which the code depends as well: the kernels that it calls,
 and the constants that it uses. After an update, the old code would go on running, without a word.
-Here what is kept of a kernel is stamped with all of these too. Whoever imports ``push_model`` gets
-it: import it before a file with kernels.
+Here what is kept of a kernel is stamped with all of these too.
+
+A kernel contains a copy of each kernel that it calls, optimised for this caller. numba gives all
+copies the same name, and the one that is loaded first serves all. With ``fastmath``, copies differ
+in the last bits, because sums are added up in another order. Results would then depend on which
+kernels have been called before, and on whether they were compiled in this process. Here each kernel
+keeps its own copies to itself.
+
+Whoever imports ``push_model`` gets both: import it before a file with kernels.
 """
 
 import hashlib
@@ -16,9 +23,12 @@ from typing import Any
 import numba
 import numpy as np
 from numba.core import caching
+from numba.core.codegen import CPUCodeLibrary
 from numba.core.dispatcher import Dispatcher
 
-if not hasattr(caching, "InTreeCacheLocator"):
+if not (
+    hasattr(caching, "InTreeCacheLocator") and hasattr(CPUCodeLibrary, "_optimize_final_module")
+):
     raise ImportError(f"numba 0.62 or later is needed, this is {numba.__version__}; update it")
 
 PACKAGES = (
@@ -34,6 +44,7 @@ PACKAGES = (
     "swarm_push",
 )
 """Kernels of these, and those that call them, are stamped like this."""
+_BUILD = b"own copies"  # of the kernels that are called; changes when the way of compiling does
 _CONSTANT = (bool, int, float, complex, str, bytes, tuple, np.ndarray)
 
 
@@ -104,7 +115,7 @@ class _Stamped:
 
     def get_source_stamp(self) -> tuple[bytes, bytes]:
         """See numba."""
-        digest = hashlib.sha256("".join(_facts(self._namespace, False)).encode())
+        digest = hashlib.sha256(_BUILD + "".join(_facts(self._namespace, False)).encode())
         for name, namespace in sorted(modules_used(self._namespace).items()):
             digest.update(f"{name}: {' '.join(_facts(namespace, True))}".encode())
         return super().get_source_stamp(), digest.digest()  # type: ignore[misc]
@@ -122,8 +133,20 @@ class UserWide(_Stamped, caching.UserWideCacheLocator):
     """In the cache of the user, if the source is in a folder that nobody may write to."""
 
 
+def _with_own_copies(library: CPUCodeLibrary) -> None:
+    """In place of numba's last step: optimise the code of a kernel, with what it calls."""
+    for function in library._final_module.functions:
+        if not function.is_declaration and function.linkage.name == "linkonce_odr":
+            function.linkage = "internal"
+    _optimised(library)
+
+
+_optimised: Any = CPUCodeLibrary._optimize_final_module
+
+
 def _install() -> None:
-    """Make numba ask these first, in this process."""
+    """Make numba do so, and ask these locators first, in this process."""
+    CPUCodeLibrary._optimize_final_module = _with_own_copies  # type: ignore[method-assign]
     ours = [f"{__name__}.{c.__qualname__}" for c in (UserProvided, InTree, UserWide)]
     others = numba.config.CACHE_LOCATOR_CLASSES or ",".join(
         c.__name__ for c in caching.CacheImpl._locator_classes

@@ -58,13 +58,14 @@ _HOW = f"""<p>All methods run in the same graph in lockstep, with the same rooms
 noise, latency, drawn frictions and tolerances; a seed gives every method the same problem. Ranks
 are only among methods that are told the same. A method of other authors is ranked only if our
 reconstruction of it reaches the figure of its own paper. Λ is the time until the object is there,
-CPU time of planning included, over the time of a robot at full speed on the straight line; it is
-the mean over the matches that reach the goal. In the contests <code>env…</code> and
-<code>plates-…</code>, a match in which the object or a robot touches an obstacle does not count as
-reached. In the contests <code>open-…</code>, a job fails if the object has come no closer to its
-goal for {STALLED:.0f} s. Clearance is the least distance of the object from obstacles over all
-matches that reach the goal. <em>Leads</em> names the ranked methods of the same information whose
-interval lies entirely on the worse side. CPU is that of the whole match, the simulation included.
+over the time of a robot at full speed on the straight line. CPU time of planning beyond the time
+until the next frame is added to it. Λ is the mean over the matches that reach the goal. In the
+contests <code>env…</code> and <code>plates-…</code>, a match in which the object or a robot
+touches an obstacle does not count as reached. In the contests <code>open-…</code>, a job fails if
+the object has come no closer to its goal for {STALLED:.0f} s. Clearance is the least distance of
+the object from obstacles over all matches that reach the goal. <em>Leads</em> names the ranked
+methods of the same information whose interval lies entirely on the worse side. CPU is that of the
+whole match, the simulation included.
 Two runs with equal seeds differ only in CPU times, and by these in the planning that Λ and time
 contain.</p>"""
 

@@ -6,6 +6,8 @@ import sys
 from itertools import count
 from pathlib import Path
 
+import numba
+import numpy as np
 import pytest
 from numba.core.dispatcher import Dispatcher
 
@@ -66,6 +68,61 @@ def write(folder, value=0.5, factor=1.0, table=(0.0, 3.0), fields="a b"):
     constants = f"import numpy as np\nFACTOR = {factor}\nTABLE = np.array({list(table)})\n"
     constants += f"from collections import namedtuple\nPair = namedtuple('Pair', '{fields}')\n"
     (package / "constants.py").write_text(constants)
+
+
+CURVES = """
+import hashlib, sys
+import numpy as np
+from push_planner import push_curve as c
+
+given = 1.0, 0.1, 1.0, 0.0, -3.0, 2.5
+if "callees" in sys.argv:
+    c._refine(0.1, 0.1, 1e18, 0.2, *given, c.BASIS_COARSE)
+    c._length(0.1, 0.1, *given[:4], c.BASIS_COARSE)
+    c._holds(0.1, 0.1, *given, c.BASIS_COARSE)
+    c._violation(0.1, 0.1, *given, c.BASIS_COARSE, np.empty(41))
+random = np.random.default_rng(1)
+digest = hashlib.sha256()
+for x, y, t in random.uniform([0.1, -0.5, -1.2], [1.5, 0.5, 1.2], (400, 3)):
+    found = c.solve_curve(x, y, np.cos(t), np.sin(t), *given[4:], c.BASIS_COARSE, c.BASIS_DENSE)
+    digest.update(np.array(found).tobytes())
+print(digest.hexdigest(), sum(c.solve_curve.stats.cache_hits.values()))
+"""
+
+
+@pytest.mark.long
+def test_results_are_equal_to_the_bit_whatever_was_compiled_and_called_before(tmp_path):
+    """Curves of pushes: sums with ``fastmath`` in kernels that other kernels call."""
+    told = []
+    for folder, order in (("a", ()), ("a", ()), ("a", ("callees",)), ("b", ("callees",))):
+        changes = {"PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path / folder)}
+        command = [sys.executable, "-c", CURVES, *order]
+        out = subprocess.run(
+            command, env=os.environ | changes, capture_output=True, text=True, check=True
+        )
+        told.append(out.stdout.split())
+    assert [kept for _, kept in told] == ["0", "1", "1", "0"]
+    assert len({digest for digest, _ in told}) == 1, told
+
+
+def test_a_kernel_shares_no_code_with_those_that_it_calls():
+    @numba.njit(fastmath=True)
+    def callee(x):
+        total = 0.0
+        for value in x:
+            total += np.sqrt(value)
+        return total
+
+    @numba.njit(fastmath=True)
+    def caller(x):
+        return callee(x) + callee(x[1:])
+
+    assert caller(np.arange(9.0)) > callee(np.arange(9.0))
+    for kernel in (caller, callee):
+        (compiled,) = kernel.overloads.values()
+        functions = [f for f in compiled.library._final_module.functions if not f.is_declaration]
+        shared = {f.name for f in functions if f.linkage.name not in ("internal", "external")}
+        assert functions and not shared
 
 
 @pytest.mark.long
