@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import dijkstra
 from push_model.arrays import Array
 from push_model.outlines import distance, inside, overlap
 from push_planner.covering_tour import covering_tour
-from push_planner.sweeps import Area, Front, Sweep, shifts, sweeps
+from push_planner.sweeps import Area, Front, Sweep, run_up, shifts, sweeps
 
 _PITCH = 0.25  # [m] of the lattice
 _STEPS = ((1, 0), (0, 1), (1, 1), (1, -1), (2, 1), (1, 2), (2, -1), (1, -2))
@@ -61,6 +61,7 @@ class AreaClearing:
             there = shifts(self._area, self._front, inner, _MARGIN)
         if not there:
             return None
+        there = [run_up(self._area, self._front, s, inner, _MARGIN) for s in there]
         dear = self._fixed + _dear(self._away(inner), _NEAR)
         starts = self._nearest(np.array([s.start for s in there]))
         ends = self._nearest(np.array([s.end for s in there]))

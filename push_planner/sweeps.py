@@ -9,7 +9,7 @@ Points are in the frame of the room, whose origin is at its centre.
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,6 +22,7 @@ front's width."""
 _BESIDE_SHIFTED = tuple(0.1 * k for n in range(9) for k in sorted({-n, n}))
 """Likewise, of a shift: near to each other, for a front that only just fits between columns."""
 _SHIFTS = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0)  # [m]
+_RUN_UPS = 4  # lengths that are tried
 _BEYOND = 0.08  # [m] beyond the edge that the front comes
 _TAKEN = 0.79  # of half the width, within which the centre of an object that is taken lies
 
@@ -34,6 +35,11 @@ class Front:
     ahead: float
     behind: float
     half_width: float
+
+    @property
+    def swing(self) -> float:
+        """[m] that its corners come ahead of it when the robot turns on the spot."""
+        return math.hypot(self.ahead, self.half_width) - self.ahead
 
 
 @dataclass(frozen=True)
@@ -114,6 +120,21 @@ def shifts(area: Area, front: Front, boxes: Sequence[Array], margin: float) -> l
                     if alone:
                         break
     return found or crowded
+
+
+def run_up(area: Area, front: Front, sweep: Sweep, boxes: Sequence[Array], margin: float) -> Sweep:
+    """The sweep from farther back, as far as there is room, and so far at most that a robot that
+    turns on the spot at the start does not touch the objects before it. Arguments as of ``sweeps``.
+    """
+    out = np.array([math.cos(sweep.heading), math.sin(sweep.heading)])
+    axes = np.array([-out[1], out[0]]), out
+    for back in front.swing * np.linspace(1.0, 0.0, _RUN_UPS, endpoint=False):
+        longer = replace(sweep, start=sweep.start - back * out)
+        swath = _swath(front, longer, axes, margin, float(sweep.start @ out) + front.ahead)
+        room = bool((np.abs(swath) <= area.limits).all())
+        if room and not any(overlap(swath, other) for other in (*area.fixed, *boxes)):
+            return longer
+    return sweep
 
 
 def _over(

@@ -6,7 +6,7 @@ boxes. The planner of this project is also told the walls and columns, which GTS
 
 import math
 from collections import deque
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ FRONT = Front(0.72, 0.72, 1.22)
 """Of the robot of benchnpin's area clearing: a flat bumper, 2.4 m wide, with rounded corners."""
 _SPARE = 1.05  # [m] that a box needs beyond an edge
 _MOST = 60  # sweeps of an episode
+_MOVED = 0.3  # [m] of a box after which its sweep is planned anew
 _AT = 0.03  # [m] from a point at which it is reached
 _TURNED = 0.012  # [rad], likewise
 _EASE = 0.2  # [s] in which errors are to vanish
@@ -49,12 +50,24 @@ def sweeping(room: dict[str, Any]) -> Policy:
             return
         way, sweep = planned
         try:
-            for point in way[:-1]:
-                seen = yield from robot.drive(seen, point, None)
-            seen = yield from robot.drive(seen, way[-1], sweep.heading)
-            seen = yield from robot.sweep(seen, sweep, area.outline)
+            for number, point in enumerate(way, 1):
+                then = sweep.heading if number == len(way) else None
+                seen = yield from robot.drive(seen, point, then)
+                if moved(sweep, boxes, seen):
+                    break
+            else:
+                seen = yield from robot.sweep(seen, sweep, area.outline)
         except _Blocked as blocked:
             seen = yield from robot.back_off(blocked.seen)
+
+
+def moved(sweep: Sweep, boxes: Sequence[Array], seen: dict[str, Any]) -> bool:
+    """Whether a box that a sweep takes is no longer where it was: the robot has pushed it on its
+    way. boxes: outlines ``(k, 2)`` [m] when the sweep was planned; seen: as the room tells now."""
+    taken = [k for k in range(len(boxes)) if sweep.takes >> k & 1]
+    return any(
+        np.hypot(*(np.array(seen["boxes"][k]) - boxes[k]).mean(axis=0)) > _MOVED for k in taken
+    )
 
 
 class _Blocked(Exception):

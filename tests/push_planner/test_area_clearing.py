@@ -9,7 +9,7 @@ from push_model import se2
 from push_model.outlines import distance, inside, overlap
 from push_planner.area_clearing import AreaClearing
 from push_planner.covering_tour import covering_tour
-from push_planner.sweeps import Area, Front, shifts, sweeps
+from push_planner.sweeps import Area, Front, run_up, shifts, sweeps
 
 FRONT = Front(0.72, 0.72, 1.22)
 CORNERS = 5.0 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -82,6 +82,34 @@ def test_a_sweep_takes_what_lies_before_the_front_and_touches_nothing_else(seed)
         for k, box in enumerate(boxes):
             assert overlap(strip, box) == bool(sweep.takes >> k & 1)
             assert not overlap(robot, box)
+
+
+@pytest.mark.parametrize("seed", range(100))
+def test_a_robot_that_turns_at_the_start_of_a_run_up_touches_nothing_before_it(seed):
+    """A sweep is the same but for its start, and where there is room, that is so far back that the
+    circle of the robot's corners keeps off what the sweep takes. Nothing lies in the run-up."""
+    random = np.random.default_rng(seed)
+    boxes = drawn(random, 10, turned=seed % 2 > 0)
+    column = BOX + random.uniform(-6.5, 6.5, 2)
+    area = Area(CORNERS, EDGES, np.array([7.0, 7.0]), (column,), 1.05)
+    corner = np.hypot(FRONT.ahead, FRONT.half_width)
+    lengths = []
+    for sweep in sweeps(area, FRONT, boxes, 0.12):
+        longer = run_up(area, FRONT, sweep, boxes, 0.12)
+        out = np.array([np.cos(sweep.heading), np.sin(sweep.heading)])
+        back = sweep.start - longer.start
+        assert longer.end is sweep.end and longer.takes == sweep.takes
+        assert np.allclose(back, (back @ out) * out) and -1e-9 < back @ out < FRONT.swing + 1e-9
+        lengths.append(round(float(back @ out) / FRONT.swing, 9))
+        across = FRONT.half_width * np.array([-out[1], out[0]])
+        rear, front = longer.start - FRONT.behind * out, sweep.start + FRONT.ahead * out
+        strip = np.array([rear - across, rear + across, front + across, front - across])
+        assert (np.abs(strip) < 7.0).all()
+        assert not any(overlap(strip, body) for body in (column, *boxes))
+        if lengths[-1] == 1.0:
+            taken = [box for k, box in enumerate(boxes) if sweep.takes >> k & 1]
+            assert all(distance(box, longer.start[None])[0] > corner for box in taken)
+    assert set(lengths) <= {0.0, 0.25, 0.5, 0.75, 1.0} and max(lengths) == 1.0
 
 
 @pytest.mark.parametrize("seed", range(30))

@@ -86,6 +86,35 @@ def test_the_sweeping_robot_keeps_to_the_action_space_and_ends():
     assert not any(overlap(np.array(told(pose, boxes)["area"]), box) for box in boxes)
 
 
+@pytest.mark.parametrize(("by", "plans"), [(0.1, 1), (0.6, 2)])
+def test_a_box_that_is_pushed_on_the_way_is_planned_for_anew(by, plans, monkeypatch):
+    """Once, before the sweep begins; the other box is not part of the sweep."""
+    made, planned = [], policies.AreaClearing.next_sweep
+
+    def next_sweep(planner, pose, boxes):
+        made.append(planned(planner, pose, boxes))
+        return made[-1]
+
+    monkeypatch.setattr(policies.AreaClearing, "next_sweep", next_sweep)
+    boxes = [SQUARE + [0.0, 1.0], SQUARE + [-4.4, 4.4]]
+    pose = np.array([4.0, -4.0, 0.5 * math.pi])
+    policy = policies.sweeping(told(pose, boxes))
+    action = next(policy)
+    (first,) = made
+    (taken,) = (k for k in range(2) if first[1].takes >> k & 1)
+    for k in range(4000):
+        pose = moved(pose, action)
+        if k == 5:
+            boxes[taken] = boxes[taken] + [by, 0.0]
+            boxes[1 - taken] = boxes[1 - taken] + [0.9, 0.0]
+        action = policy.send(told(pose, boxes))
+        out = np.array([math.cos(first[1].heading), math.sin(first[1].heading)])
+        sweeps = np.hypot(*(pose[:2] - first[1].start)) < 0.5 and action[0] == 1.0
+        if len(made) > 1 or (sweeps and (pose[:2] - first[1].start) @ out > 0.2):
+            break
+    assert k < 3999 and len(made) == plans
+
+
 def test_a_robot_that_does_not_move_backs_off_and_tries_again():
     """Whatever it is told to do, it stands: no command is repeated for long."""
     pose, boxes = np.array([0.0, -4.0, 0.5 * math.pi]), [SQUARE + [2.0, 1.0]]
