@@ -51,7 +51,7 @@ SECTIONS: dict[str, type[Any]] = {
     "tracker": TrackerSettings,
 }
 _POINTS = 10  # of a trajectory, of which a report shows one
-_LONGEST = 0.05  # [s] from one frame to the next that is made use of for planning
+_LONGEST = 0.05  # [s] between two frames that planning uses at most
 
 
 class OneRobotMethod:
@@ -81,7 +81,7 @@ class OneRobotMethod:
         self._question: Question | None = None  # a command that waits, or is worked on
         self._repair: commands.Repair | None = None  # likewise, while the robot pushes
         self._not_before, self._looked = 0.0, math.nan
-        self._slices = 1  # of planning, in this frame
+        self._slices, self._stepped = 1, math.nan  # of planning in this frame; [s] of the last one
 
     def _around(self, robot: RobotSpec, item: ObjectSpec) -> Surroundings:
         near = Surroundings(robot, item, {}, self._settings)  # other bodies come with each frame
@@ -126,12 +126,13 @@ class OneRobotMethod:
     def begin(self, task: Task, belief: Belief) -> None:
         """See Method: the job begins with the next frame, which shows where the object is."""
         self._goal, self._looked, self._drive.held = task.goal, math.nan, 0.0
+        self._stepped = math.nan  # frames of before tell nothing of the next ones
 
     def step(self, seen: Seen, belief: Belief) -> Told:
         """See Method: a tick of the tracker, then what the state machine wants next. A plan is made
-        in slices: one a frame while the robot pushes, else as many as fit between two frames."""
-        elapsed = 0.0 if self._seen is None else seen.time - self._seen.time
-        self._slices = max(1, round(min(elapsed, _LONGEST) / SLICE))
+        in slices: one a frame while the robot pushes, else one for each 5 ms between frames."""
+        elapsed, self._stepped = seen.time - self._stepped, seen.time
+        self._slices = max(1, round(min(elapsed, _LONGEST) / SLICE)) if elapsed > 0.0 else 1
         self._seen = seen
         self._take_up(belief)
         if self._goal is not None:

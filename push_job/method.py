@@ -78,7 +78,8 @@ class Told:
 
     commands: by robot; v [m/s] and omega [rad/s] of robots on wheels; vx, vy [m/s] in the fixed
     frame and, where they are to turn, omega [rad/s] of the others. A robot without one stands.
-    planning: [s] CPU time that planning took in this step; studies charge it.
+    planning: [s] CPU time that planning took in this step. Where it exceeds the time between two
+    frames, studies add the excess to the time of the task.
     """
 
     commands: Mapping[str, Command] = field(default_factory=dict)

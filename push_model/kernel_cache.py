@@ -6,10 +6,10 @@ and the constants that it uses. After an update, the old code would go on runnin
 Here what is kept of a kernel is stamped with all of these too.
 
 A kernel contains a copy of each kernel that it calls, optimised for this caller. numba gives all
-copies the same name, and the one that is loaded first serves all. With ``fastmath``, copies differ
-in the last bits, because sums are added up in another order. Results would then depend on which
-kernels have been called before, and on whether they were compiled in this process. Here each kernel
-keeps its own copies to itself.
+copies the same name, and the one that is loaded first serves all callers. With ``fastmath``, copies
+differ in the last bits, because sums are added up in another order. Results would then depend on
+which kernels have been called before, and on whether they were compiled in this process. Here each
+kernel uses only its own copies.
 
 Whoever imports ``push_model`` gets both: import it before a file with kernels.
 """
@@ -26,9 +26,7 @@ from numba.core import caching
 from numba.core.codegen import CPUCodeLibrary
 from numba.core.dispatcher import Dispatcher
 
-if not (
-    hasattr(caching, "InTreeCacheLocator") and hasattr(CPUCodeLibrary, "_optimize_final_module")
-):
+if not hasattr(caching, "InTreeCacheLocator"):
     raise ImportError(f"numba 0.62 or later is needed, this is {numba.__version__}; update it")
 
 PACKAGES = (
@@ -44,7 +42,8 @@ PACKAGES = (
     "swarm_push",
 )
 """Kernels of these, and those that call them, are stamped like this."""
-_BUILD = b"own copies"  # of the kernels that are called; changes when the way of compiling does
+_BUILD = b"own copies, 2"  # changes when the way of compiling does
+_KERNEL = "_ZN"  # begins the names of kernels; those of numba's helpers begin with NRT_
 _CONSTANT = (bool, int, float, complex, str, bytes, tuple, np.ndarray)
 
 
@@ -133,20 +132,31 @@ class UserWide(_Stamped, caching.UserWideCacheLocator):
     """In the cache of the user, if the source is in a folder that nobody may write to."""
 
 
-def _with_own_copies(library: CPUCodeLibrary) -> None:
-    """In place of numba's last step: optimise the code of a kernel, with what it calls."""
-    for function in library._final_module.functions:
-        if not function.is_declaration and function.linkage.name == "linkonce_odr":
-            function.linkage = "internal"
-    _optimised(library)
+class _OwnCopies:
+    """Takes the place of a method of numba that optimises the code of a kernel, its callees
+    included: before that, the copies of these become private."""
 
+    def __init__(self, optimise: Any) -> None:
+        self._optimise = optimise
 
-_optimised: Any = CPUCodeLibrary._optimize_final_module
+    def __get__(self, library: Any, _: Any = None) -> Any:
+        return lambda: self(library)
+
+    def __call__(self, library: Any) -> None:
+        for function in library._final_module.functions:
+            copied = not function.is_declaration and function.linkage.name == "linkonce_odr"
+            if copied and function.name.startswith(_KERNEL):
+                function.linkage = "internal"
+        self._optimise(library)
 
 
 def _install() -> None:
     """Make numba do so, and ask these locators first, in this process."""
-    CPUCodeLibrary._optimize_final_module = _with_own_copies  # type: ignore[method-assign]
+    optimise = vars(CPUCodeLibrary).get("_optimize_final_module")
+    if optimise is None:
+        raise ImportError(f"numba {numba.__version__} is not known here; install 0.68.1")
+    if not isinstance(optimise, _OwnCopies):
+        CPUCodeLibrary._optimize_final_module = _OwnCopies(optimise)  # type: ignore[method-assign]
     ours = [f"{__name__}.{c.__qualname__}" for c in (UserProvided, InTree, UserWide)]
     others = numba.config.CACHE_LOCATOR_CLASSES or ",".join(
         c.__name__ for c in caching.CacheImpl._locator_classes

@@ -20,6 +20,7 @@ from push_msgs.action import PlanPush
 from push_msgs.msg import PushPlan as PlanMessage
 from push_msgs.srv import PlanRobotPath
 from push_planner import (
+    SLICE,
     DistanceField,
     NoRobotPath,
     PlanError,
@@ -55,7 +56,7 @@ from push_ros.scheduling import Urgency
 from push_ros.validation import FRAME, InvalidMessage, planar_pose
 from push_scenario.scenario import Scenario, load_scenario
 
-_AT_ONCE = 2  # slices: in lockstep at 100 Hz as many as fit between two frames
+_AT_ONCE = round(0.01 / SLICE)  # slices: as many as fit between two frames at 100 Hz
 _SIGN_OF_LIFE = 0.5  # [s] wall time between feedback messages at most
 
 

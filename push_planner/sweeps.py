@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from push_model.arrays import Array
-from push_model.outlines import overlap
+from push_model.outlines import distance, overlap
 
 _BESIDE = (-0.7, -0.375, 0.0, 0.375, 0.7)
 """Where the centre of an object lies in a sweep that is laid out for it, as a share of half the
@@ -37,9 +37,9 @@ class Front:
     half_width: float
 
     @property
-    def swing(self) -> float:
-        """[m] that its corners come ahead of it when the robot turns on the spot."""
-        return math.hypot(self.ahead, self.half_width) - self.ahead
+    def corner(self) -> float:
+        """[m] from the robot's origin to its front corners: the radius of a turn on the spot."""
+        return math.hypot(self.ahead, self.half_width)
 
 
 @dataclass(frozen=True)
@@ -123,16 +123,19 @@ def shifts(area: Area, front: Front, boxes: Sequence[Array], margin: float) -> l
 
 
 def run_up(area: Area, front: Front, sweep: Sweep, boxes: Sequence[Array], margin: float) -> Sweep:
-    """The sweep from farther back, as far as there is room, and so far at most that a robot that
-    turns on the spot at the start does not touch the objects before it. Arguments as of ``sweeps``.
-    """
+    """The sweep from farther back, so that a robot that turns on the spot at the start does not
+    touch the objects before it; from less far back if there is no room, also for the turn. If there
+    is none at all, the sweep itself. Arguments as of ``sweeps``."""
     out = np.array([math.cos(sweep.heading), math.sin(sweep.heading)])
     axes = np.array([-out[1], out[0]]), out
-    for back in front.swing * np.linspace(1.0, 0.0, _RUN_UPS, endpoint=False):
+    for back in (front.corner - front.ahead) * np.linspace(1.0, 0.0, _RUN_UPS, endpoint=False):
         longer = replace(sweep, start=sweep.start - back * out)
         swath = _swath(front, longer, axes, margin, float(sweep.start @ out) + front.ahead)
-        room = bool((np.abs(swath) <= area.limits).all())
-        if room and not any(overlap(swath, other) for other in (*area.fixed, *boxes)):
+        inside = (np.abs(swath) <= area.limits).all()
+        turns = (np.abs(longer.start) + front.corner <= area.limits).all() and all(
+            distance(other, longer.start[None])[0] >= front.corner for other in area.fixed
+        )
+        if inside and turns and not any(overlap(swath, b) for b in (*area.fixed, *boxes)):
             return longer
     return sweep
 

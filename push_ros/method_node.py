@@ -103,9 +103,11 @@ class MethodNode(Node):
         self._seen: Seen | None = None
         self._missing = 0.0  # [s] of pose time without the object
         self._stamp, self._reported = Header().stamp, -math.inf
-        self.planning_time = self.planning_delay = 0.0
-        """[s] CPU time that the method's planning has taken so far; by how much it took longer than
-        from one frame to the next, in sum."""
+        self.planning_time = 0.0
+        """[s] CPU time that the method's planning has taken so far."""
+        self.planning_delay = 0.0
+        """[s] of it, summed over frames, that exceeded the time since the frame before. Frames are
+        taken to come at equal times."""
         self._diagnostics = Diagnostics(self, names, self._state)
         self.beliefs = BeliefFeed(self, names, scenario, self._diagnostics)
         self.partners = hosting.attach(self)

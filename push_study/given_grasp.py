@@ -1,6 +1,6 @@
 """The group method with a grasp that a study has chosen: random, selected, optimised or given.
 
-It runs in the graph by the name ``NAME``. Choosing is planning, and its CPU time is charged.
+It runs in the graph by the name ``NAME``. Choosing is planning.
 """
 
 import time

@@ -52,8 +52,9 @@ def time_by_state(states: Sequence[tuple[float, str, str, int]]) -> dict[str, fl
 def job_times(trace: Trace, drive: DifferentialDrive, planning: float) -> Row:
     """Measures of a job: its time, also by state, the path of the robot and its shortest time.
 
-    planning: [s] CPU time of all plans. In a simulated run a slice of a plan takes one period of
-    the poses, whatever its CPU time. In ``charged_s`` planning takes its CPU time, if that is more.
+    planning: [s] CPU time of all plans. In a simulated run two slices of a plan take one period
+    of the poses, whatever their CPU time. In ``charged_s`` planning takes its CPU time, if that is
+    more.
     """
     spent, poses = time_by_state(trace.states), path(trace)
     total, least = sum(spent.values()), shortest_time(poses, drive)

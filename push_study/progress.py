@@ -64,10 +64,10 @@ def title(task: Any) -> str:
     told = [Path(task.scenario).stem] if hasattr(task, "scenario") else []
     for field in dataclasses.fields(task):
         value = getattr(task, field.name)
-        if field.name in _ALIKE or isinstance(value, bool):
+        if field.name in _ALIKE:
             continue
         if isinstance(value, str) and value:
             told.append(value)
-        elif isinstance(value, int):
+        elif isinstance(value, int | float):  # also a bool
             told.append(f"{field.name.replace('_', ' ')} {value}")
     return ", ".join([*told, f"seed {task.seed}"])

@@ -91,11 +91,11 @@ class TeamTrace:
 class Outcome:
     """What became of a task.
 
-    reached: targets; code, reason: of the end; seconds: of simulation, in which a frame comes only
-    when the one before has been answered; planning: [s] CPU time of plans; delay: [s] of it that is
-    longer than from a frame to the next, or is spent in a node of its own; error: [m], [rad] of the
-    object from the goal at the end, from ground truth. drawn: what of the world was not as
-    believed.
+    reached: targets; code, reason: of the end; seconds: of simulation, which waits for the answer
+    to each frame; planning: [s] CPU time of plans; delay: [s] that planning makes the task longer:
+    what exceeds the time between two frames, and all CPU time of a planner with a node of its own;
+    error: [m], [rad] of the object from the goal at the end, from ground truth. drawn: what of the
+    world was not as believed.
     """
 
     reached: int

@@ -21,7 +21,7 @@ from push_planner.sweeps import Area, Front, Sweep
 FRONT = Front(0.72, 0.72, 1.22)
 """Of the robot of benchnpin's area clearing: a flat bumper, 2.4 m wide, with rounded corners."""
 _SPARE = 1.05  # [m] that a box needs beyond an edge
-_MOST = 60  # sweeps of an episode
+_MOST = 100  # plans of an episode
 _MOVED = 0.3  # [m] of a box after which its sweep is planned anew
 _AT = 0.03  # [m] from a point at which it is reached
 _TURNED = 0.012  # [rad], likewise
@@ -50,20 +50,23 @@ def sweeping(room: dict[str, Any]) -> Policy:
             return
         way, sweep = planned
         try:
-            for number, point in enumerate(way, 1):
-                then = sweep.heading if number == len(way) else None
-                seen = yield from robot.drive(seen, point, then)
+            for point in way[:-1]:
+                seen = yield from robot.drive(seen, point, None)
                 if moved(sweep, boxes, seen):
                     break
             else:
-                seen = yield from robot.sweep(seen, sweep, area.outline)
+                seen = yield from robot.drive(seen, way[-1], sweep.heading)
+                seen = yield from robot.face(seen, sweep.heading)
+                if not moved(sweep, boxes, seen):
+                    seen = yield from robot.sweep(seen, sweep, area.outline)
         except _Blocked as blocked:
             seen = yield from robot.back_off(blocked.seen)
 
 
 def moved(sweep: Sweep, boxes: Sequence[Array], seen: dict[str, Any]) -> bool:
     """Whether a box that a sweep takes is no longer where it was: the robot has pushed it on its
-    way. boxes: outlines ``(k, 2)`` [m] when the sweep was planned; seen: as the room tells now."""
+    way. Of shifts, which take none, this is not known. boxes: outlines ``(k, 2)`` [m] when the
+    sweep was planned; seen: as the room tells now."""
     taken = [k for k in range(len(boxes)) if sweep.takes >> k & 1]
     return any(
         np.hypot(*(np.array(seen["boxes"][k]) - boxes[k]).mean(axis=0)) > _MOVED for k in taken
@@ -99,7 +102,7 @@ class _Robot:
             for back in (0.0, math.pi)
         ]
         back, sign = (0.0, 1.0) if turns[0] <= turns[1] else (math.pi, -1.0)
-        seen = yield from self._face(seen, course + back)
+        seen = yield from self.face(seen, course + back)
         nearest = math.inf
         while True:
             away = point - seen["pose"][:2]
@@ -119,7 +122,7 @@ class _Robot:
         out = np.array([math.cos(sweep.heading), math.sin(sweep.heading)])
         across = np.array([-out[1], out[0]])
         takes = [k for k in range(len(seen["boxes"])) if sweep.takes >> k & 1]
-        seen = yield from self._face(seen, sweep.heading)
+        seen = yield from self.face(seen, sweep.heading)
         while True:
             left = float((sweep.end - seen["pose"][:2]) @ out)
             gone = not any(overlap(area, np.array(seen["boxes"][k])) for k in takes)
@@ -138,9 +141,10 @@ class _Robot:
         self._poses.clear()
         return seen
 
-    def _face(
+    def face(
         self, seen: dict[str, Any], heading: float
     ) -> Generator[Action, dict[str, Any], dict[str, Any]]:
+        """Turn on the spot to a heading [rad]."""
         while abs(error := se2.wrap(heading - seen["pose"][2])) > _TURNED:
             seen = yield from self._act(0.0, 0.9 * error / _EASE)
         return seen

@@ -12,6 +12,7 @@ import numpy as np
 
 from push_model import se2
 from push_model.arrays import Array
+from push_model.distance_field import DistanceField
 from push_model.settings import SettingsError
 from push_model.specs import EnvironmentSpec, ObjectSpec, RobotSpec
 from push_scenario.bodies import load_object, load_robot
@@ -54,6 +55,8 @@ _REACHED, _LIMIT = 0.1, 300.0  # [m]; [s]: 19 times what a robot at full speed w
 STALLED = 180.0
 """[s] after which the job of a contest of positions fails if the object has come no closer."""
 _EXACT = 0.02, 0.1  # [m], [rad]
+_MOVED = np.array([0.1, 0.1, 0.3])  # [m, m, rad] by which starts and goals of scenarios are moved
+_FREE = 0.02  # [m] that object and robot keep from obstacles there
 
 
 def _swarm(item_name: str) -> Callable[[int], Problem]:
@@ -77,7 +80,15 @@ def _single(environment: int) -> Callable[[int], Problem]:
         assert scenario.goal is not None
         space = scenario.environment
         assert isinstance(space, EnvironmentSpec)
-        return Problem(space, item, start, np.array(scenario.goal), place[None], robot)
+        field, random = DistanceField(scenario.grid), np.random.default_rng([seed, environment])
+        behind, radius = se2.between(start, place), robot.footprint_radius
+        while True:
+            begin = start + random.uniform(-_MOVED, _MOVED)
+            goal = np.array(scenario.goal) + random.uniform(-_MOVED, _MOVED)
+            there = se2.compose(begin, behind)
+            room = field.clearances(item.outline, np.array([begin, goal])).min()
+            if min(room, field.at(there[0], there[1]) - radius) >= _FREE:
+                return Problem(space, item, begin, goal, there[None], robot)
 
     return draw
 
@@ -105,7 +116,10 @@ def _positions(item: str, words: str) -> Contest:
 
 
 def _poses(environment: int) -> Contest:
-    what = f"one robot brings the 9 cm box to the three targets of environment {environment}"
+    what = (
+        f"one robot brings the 9 cm box to a random pose near one of the three targets of "
+        f"environment {environment}, from a random pose near the start"
+    )
     name = f"env{environment}"
     return Contest(name, POSES, what, _EXACT, 300.0, _single(environment))
 

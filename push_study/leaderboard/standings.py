@@ -1,7 +1,7 @@
 """What the matches amount to: cells with intervals, and ranks among methods that are told the same.
 
-A cell is a method at a contest. Success has Wilson's 95 % interval, Lambda (time of the robots at
-full speed on the straight line, planning included) Student's over the matches that succeeded. One
+A cell is a method at a contest. Success has Wilson's 95 % interval, Lambda (the charged time over
+that of a robot at full speed on the straight line) Student's over the matches that succeeded. One
 cell leads another when its interval of the share of successes lies above the other's, or where
 these overlap, when its interval of Lambda lies below.
 """
@@ -16,6 +16,8 @@ from push_study.leaderboard.entry import Entry
 from push_study.pool import Row
 from push_study.statistics import mean_interval, wilson
 
+_FEWEST = 5  # values of which an interval is told
+
 Interval = tuple[float, float]
 
 
@@ -23,8 +25,8 @@ Interval = tuple[float, float]
 class Cell:
     """A method at a contest. lambda_, path, robot_path, cpu: means over what succeeded (cpu: over
     all), nan where nothing did. path: of the object, over the straight line; robot_path: [m] of a
-    robot. clearance: [m] least of the object over what succeeded. rank: 0 where it is not ranked.
-    leads: names of methods that it leads."""
+    robot. clearance: [m] least of the object over what succeeded. rank: 0 where it is not ranked,
+    or no other ranked method is told the same. leads: names of methods that it leads."""
 
     contest: str
     entry: Entry
@@ -68,7 +70,7 @@ def _cell(contest: str, method: str, entry: Entry, rows: Sequence[Row]) -> Cell 
         len(good),
         wilson(len(good), len(mine)),
         _mean(values),
-        mean_interval(values),
+        mean_interval(values) if len(values) >= _FEWEST else (math.nan, math.nan),
         _mean(np.array([r["charged_s"] for r in good])),
         _mean(np.array([r["path_ratio"] for r in good])),
         _mean(np.array([r["robot_path_m"] for r in good])),
@@ -93,10 +95,10 @@ def _ranked(here: list[Cell]) -> list[Cell]:
         equal = [c for c in here if c.entry.told == what]
         # No Lambda is the worst Lambda.
         ordered = sorted(equal, key=lambda c: (-c.successes / c.trials, _last(c.lambda_)))
-        number = 0
+        number, alone = 0, sum(c.entry.ranked for c in ordered) < 2
         for c in ordered:
             number += c.entry.ranked
-            if c.entry.ranked:
+            if c.entry.ranked and not alone:
                 ahead = tuple(o.entry.name for o in ordered if o.entry.ranked and leads(c, o))
                 c = replace(c, rank=number, leads=ahead)
             result.append(c)

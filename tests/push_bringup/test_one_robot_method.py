@@ -301,13 +301,17 @@ def test_between_frames_that_are_farther_apart_more_slices_of_a_plan_are_done(
     period, most, monkeypatch
 ):
     book = Notebook("env1-target1")
+    book.begin()
+    book.step(period)
+    book.method.end(JobError.CANCELED, "to begin again")
+    book.time += 10.0  # it is not stepped meanwhile
     stages, counts = slices_of(monkeypatch), []
     book.begin()
-    while not book.method.machine.segments:
+    while not book.method.machine.segments and len(counts) < 1000:
         before = len(stages)
         book.step(period)
         counts.append(len(stages) - before)
-    assert sum(counts) == len(stages) > 3 * most
+    assert len(stages) > 3 * most
     assert counts[0] == 1, "it is not known yet how far apart frames are"
     assert set(counts[1:-1]) == {most} and counts[-1] <= most
 

@@ -86,8 +86,9 @@ def test_a_sweep_takes_what_lies_before_the_front_and_touches_nothing_else(seed)
 
 @pytest.mark.parametrize("seed", range(100))
 def test_a_robot_that_turns_at_the_start_of_a_run_up_touches_nothing_before_it(seed):
-    """A sweep is the same but for its start, and where there is room, that is so far back that the
-    circle of the robot's corners keeps off what the sweep takes. Nothing lies in the run-up."""
+    """A sweep is the same but for its start. Where there is room, that is so far back that the
+    circle of the robot's corners keeps off what the sweep takes. It always keeps off walls and
+    columns. Nothing lies in the run-up."""
     random = np.random.default_rng(seed)
     boxes = drawn(random, 10, turned=seed % 2 > 0)
     column = BOX + random.uniform(-6.5, 6.5, 2)
@@ -99,13 +100,17 @@ def test_a_robot_that_turns_at_the_start_of_a_run_up_touches_nothing_before_it(s
         out = np.array([np.cos(sweep.heading), np.sin(sweep.heading)])
         back = sweep.start - longer.start
         assert longer.end is sweep.end and longer.takes == sweep.takes
-        assert np.allclose(back, (back @ out) * out) and -1e-9 < back @ out < FRONT.swing + 1e-9
-        lengths.append(round(float(back @ out) / FRONT.swing, 9))
+        swing = FRONT.corner - FRONT.ahead
+        assert np.allclose(back, (back @ out) * out) and -1e-9 < back @ out < swing + 1e-9
+        lengths.append(round(float(back @ out) / swing, 9))
         across = FRONT.half_width * np.array([-out[1], out[0]])
         rear, front = longer.start - FRONT.behind * out, sweep.start + FRONT.ahead * out
         strip = np.array([rear - across, rear + across, front + across, front - across])
         assert (np.abs(strip) < 7.0).all()
         assert not any(overlap(strip, body) for body in (column, *boxes))
+        if lengths[-1] > 0.0:
+            assert (np.abs(longer.start) + corner <= 7.0).all()
+            assert distance(column, longer.start[None])[0] >= corner
         if lengths[-1] == 1.0:
             taken = [box for k, box in enumerate(boxes) if sweep.takes >> k & 1]
             assert all(distance(box, longer.start[None])[0] > corner for box in taken)

@@ -88,7 +88,7 @@ def test_the_sweeping_robot_keeps_to_the_action_space_and_ends():
 
 @pytest.mark.parametrize(("by", "plans"), [(0.1, 1), (0.6, 2)])
 def test_a_box_that_is_pushed_on_the_way_is_planned_for_anew(by, plans, monkeypatch):
-    """Once, before the sweep begins; the other box is not part of the sweep."""
+    """Before the sweep begins; the other box is not part of it."""
     made, planned = [], policies.AreaClearing.next_sweep
 
     def next_sweep(planner, pose, boxes):
@@ -108,9 +108,10 @@ def test_a_box_that_is_pushed_on_the_way_is_planned_for_anew(by, plans, monkeypa
             boxes[taken] = boxes[taken] + [by, 0.0]
             boxes[1 - taken] = boxes[1 - taken] + [0.9, 0.0]
         action = policy.send(told(pose, boxes))
-        out = np.array([math.cos(first[1].heading), math.sin(first[1].heading)])
-        sweeps = np.hypot(*(pose[:2] - first[1].start)) < 0.5 and action[0] == 1.0
-        if len(made) > 1 or (sweeps and (pose[:2] - first[1].start) @ out > 0.2):
+        heading = made[-1][1].heading
+        out = np.array([math.cos(heading), math.sin(heading)])
+        sweeps = np.hypot(*(pose[:2] - made[-1][1].start)) < 0.5 and action[0] == 1.0
+        if sweeps and (pose[:2] - made[-1][1].start) @ out > 0.2:
             break
     assert k < 3999 and len(made) == plans
 

@@ -18,6 +18,7 @@ from push_study.experiments.own_sensing import SensingTask
 from push_study.leaderboard.match import Match
 from push_study.progress import Progress, title
 from push_study.summary import aggregate
+from push_study.swarm.maps import MapTask
 from push_study.trials import identity, read_journal, run_trials
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -109,6 +110,8 @@ def test_a_trial_is_told_by_what_tells_it_from_others():
     assert title(GoalTask("a/b.yaml", 1, "/out", 4, 3, "planar", "none")) == (
         "b, robots 4, sides 3, seed 1"
     )
+    either = [MapTask("m", 1, "", "square", 9, k, "planar", "mild", 9.0) for k in (True, False)]
+    assert title(either[0]) != title(either[1])
 
 
 @pytest.mark.live
