@@ -91,7 +91,7 @@ def test_a_path_is_made_of_arcs_that_may_be_pushed(planners, backward):
     assert found > 4
 
 
-@pytest.mark.parametrize("count", [4, pytest.param(60, marks=pytest.mark.long)])
+@pytest.mark.parametrize("count", [4, pytest.param(60, marks=pytest.mark.study)])
 def test_its_pushes_join_start_and_goal_without_a_collision(planners, count):
     found = several = 0
     for planner in planners:
@@ -193,7 +193,7 @@ def test_a_side_that_the_robot_cannot_come_to_is_not_pushed_first(planners):
         assert len(first) > 1, "from several sides there are plans"
 
 
-@pytest.mark.long
+@pytest.mark.study
 def test_plans_are_cheaper_by_it(robot, box):
     """Hundreds are in docs/results.md. Few nodes: the same planner without this search."""
     ratios = []
