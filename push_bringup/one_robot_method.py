@@ -51,7 +51,7 @@ SECTIONS: dict[str, type[Any]] = {
     "tracker": TrackerSettings,
 }
 _POINTS = 10  # of a trajectory, of which a report shows one
-_LONGEST = 0.05  # [s] between two frames that planning uses at most
+_LONGEST = 0.05  # [s] between two frames; of a longer time, planning uses only so much
 
 
 class OneRobotMethod:

@@ -132,31 +132,26 @@ class UserWide(_Stamped, caching.UserWideCacheLocator):
     """In the cache of the user, if the source is in a folder that nobody may write to."""
 
 
-class _OwnCopies:
-    """Takes the place of a method of numba that optimises the code of a kernel, its callees
-    included: before that, the copies of these become private."""
+def _with_own_copies(optimise: Any) -> Any:
+    """A method of numba that optimises the code of a kernel and of the copies of its callees,
+    changed so that these copies are private before that."""
 
-    def __init__(self, optimise: Any) -> None:
-        self._optimise = optimise
-
-    def __get__(self, library: Any, _: Any = None) -> Any:
-        return lambda: self(library)
-
-    def __call__(self, library: Any) -> None:
+    def changed(library: CPUCodeLibrary) -> None:
         for function in library._final_module.functions:
             copied = not function.is_declaration and function.linkage.name == "linkonce_odr"
             if copied and function.name.startswith(_KERNEL):
                 function.linkage = "internal"
-        self._optimise(library)
+        optimise(library)
+
+    return changed
 
 
 def _install() -> None:
-    """Make numba do so, and ask these locators first, in this process."""
-    optimise = vars(CPUCodeLibrary).get("_optimize_final_module")
-    if optimise is None:
+    """Make numba keep copies private, and ask these locators first, in this process."""
+    if not hasattr(CPUCodeLibrary, "_optimize_final_module"):
         raise ImportError(f"numba {numba.__version__} is not known here; install 0.68.1")
-    if not isinstance(optimise, _OwnCopies):
-        CPUCodeLibrary._optimize_final_module = _OwnCopies(optimise)  # type: ignore[method-assign]
+    optimise = CPUCodeLibrary._optimize_final_module
+    CPUCodeLibrary._optimize_final_module = _with_own_copies(optimise)  # type: ignore[method-assign]
     ours = [f"{__name__}.{c.__qualname__}" for c in (UserProvided, InTree, UserWide)]
     others = numba.config.CACHE_LOCATOR_CLASSES or ",".join(
         c.__name__ for c in caching.CacheImpl._locator_classes

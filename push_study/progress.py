@@ -8,8 +8,8 @@ from typing import Any, TextIO
 
 _WIDTH = 30  # [characters] of the bar
 _CLEAR = "\r\033[K"
-_ALIKE = {"scenario", "seed", "out", "uncertainty", "world", "digest", "source"}
-"""Fields of tasks that a title tells in a way of its own, or not at all."""
+_NOT_NAMED = {"scenario", "seed", "out", "uncertainty", "world", "digest", "source"}
+"""Fields of tasks that a title does not list with the others."""
 
 
 class Progress:
@@ -64,7 +64,7 @@ def title(task: Any) -> str:
     told = [Path(task.scenario).stem] if hasattr(task, "scenario") else []
     for field in dataclasses.fields(task):
         value = getattr(task, field.name)
-        if field.name in _ALIKE:
+        if field.name in _NOT_NAMED:
             continue
         if isinstance(value, str) and value:
             told.append(value)

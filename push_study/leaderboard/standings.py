@@ -16,7 +16,7 @@ from push_study.leaderboard.entry import Entry
 from push_study.pool import Row
 from push_study.statistics import mean_interval, wilson
 
-_FEWEST = 5  # values of which an interval is told
+_FEWEST = 5  # values without which no interval is given
 
 Interval = tuple[float, float]
 

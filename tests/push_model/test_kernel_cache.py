@@ -106,7 +106,7 @@ def test_results_are_equal_to_the_bit_whatever_was_compiled_and_called_before(tm
 
 
 def test_a_kernel_shares_no_code_with_those_that_it_calls():
-    """Helpers of numba alone, by whose names it removes what it does not need of them."""
+    """It shares only numba's reference counting, which numba has to find by its names."""
 
     @numba.njit(fastmath=True)
     def callee(x):  # too long to become part of the caller
