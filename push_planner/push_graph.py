@@ -20,6 +20,9 @@ from push_planner.rough_cost import BLOCKED, guessed_length, pushes_into, rough_
 from push_planner.scene import PushScene, PushSide
 from push_planner.shortest_chord import shortest_chords
 
+_STRAY = 0.003  # [m] by which robot and object may end a push elsewhere than planned
+_TIGHT = 3.0  # [s] that a way costs which may then be blocked; a new plan takes about twice that
+
 
 @dataclass
 class SearchStatistics:
@@ -85,7 +88,7 @@ class PushGraph:
         self.scene = scene
         self._on_side = on_side
         self._robot = robot
-        self._ways: dict[tuple[int, int, int], bool] = {}
+        self._ways: dict[tuple[int, int, int], float] = {}  # [s] that they cost more
         order = np.argsort(candidates.way, kind="stable")
         self.poses = np.vstack([start, candidates.poses[order], goal])
         first, last = (candidates.way.min(), candidates.way.max()) if len(order) else (0.0, 0.0)
@@ -225,9 +228,7 @@ class PushGraph:
         """
         if after < 0 or before == after:
             return 0.0
-        if not self._ways.get((pose, before, after), True):
-            return math.inf
-        return float(self._changes[before, after])
+        return float(self._changes[before, after]) + self._ways.get((pose, before, after), 0.0)
 
     def first_change(self, side: int) -> float:
         """Cost [s] of changing to a side at the start; 0 if the robot does not push there."""
@@ -239,29 +240,38 @@ class PushGraph:
             return True
         key = (0, -1, side)
         if key not in self._ways:
-            self._ways[key] = self._has_way(0, self._robot, self._behind(0, side))
-        return self._ways[key]
+            way = self._has_way(0, self._robot, self._behind(0, side))
+            self._ways[key] = 0.0 if way else math.inf
+        return self._ways[key] < math.inf
 
     def may_change(self, pose: int, before: int, after: int) -> bool:
-        """Whether the robot can go round the object at a pose, from one side to another.
+        """Whether the robot can go round the object at a pose, from one side to another."""
+        self.look_for_way(pose, before, after)
+        return self.side_change(pose, before, after) < math.inf
 
-        Computed when it is first asked for. ``side_change`` is infinite after a refusal.
+    def look_for_way(self, pose: int, before: int, after: int) -> float:
+        """[s] by which ``side_change`` rises, because it is known now which way the robot has.
+
+        Infinite if there is no way. A way costs more if its passages are so narrow that they are
+        blocked if the push before ends a few millimetres elsewhere. 0 when asked again.
         """
         key = (pose, before, after)
-        if after < 0 or before == after:
-            return True
-        if key not in self._ways:
-            ends = self._behind(pose, before), self._behind(pose, after)
-            self._ways[key] = self._has_way(pose, *ends)
+        if after < 0 or before == after or key in self._ways:
+            return 0.0
+        ends = self._behind(pose, before), self._behind(pose, after)
+        if self._has_way(pose, *ends, _STRAY):
+            self._ways[key] = 0.0
+        else:
+            self._ways[key] = _TIGHT if self._has_way(pose, *ends) else math.inf
         return self._ways[key]
 
     def _behind(self, pose: int, side: int) -> Array:
         return self.scene.standoff(self.robots[side, pose, :3], self.scene.sides[side])
 
-    def _has_way(self, pose: int, start: Array, goal: Array) -> bool:
+    def _has_way(self, pose: int, start: Array, goal: Array, spare: float = 0.0) -> bool:
         scene = self.scene
         outline = se2.transform(self.poses[pose], scene.shape.outline)
-        return has_way(scene.field, scene.robot, scene.settings, start, goal, outline)
+        return has_way(scene.field, scene.robot, scene.settings, start, goal, outline, spare)
 
     def push(
         self, first: int, last: int, side: int, statistics: SearchStatistics

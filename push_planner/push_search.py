@@ -7,8 +7,8 @@ The printed Algorithm 2 computes the curves of pushes into a node, and stops at 
 pose from which one succeeds. It thereby loses plans. Here the costs of all pushes into a node are
 estimated first (rough_cost.py). The curve and the swept area of a push are computed only when its
 estimate is the best in the whole queue (lazy weighted A*). Whether the robot can go from side to
-side between the pushes is checked on a complete sequence only; if it cannot, the search goes on
-without that change of side.
+side between the pushes is checked on a complete sequence only. If it cannot, or if its way is so
+narrow that it may turn out to be blocked, the search is repeated with the cost of that change.
 """
 
 import heapq
@@ -24,7 +24,7 @@ from push_model.arrays import Array
 from push_planner.push_graph import PushGraph, PushStep, SearchStatistics
 
 _SLICE = 20  # pushes tried between two reports
-_DETOURS = 20  # solutions of one search in which the robot cannot go from side to side
+_DETOURS = 20  # solutions of one search in which a change of sides costs more than assumed
 
 
 @dataclass
@@ -84,8 +84,11 @@ class PushSearch:
             node = yield from self._cheapest(ready, estimate, statistics)
             if node is None:
                 return
-            if _passable(graph, node):
-                self.solution, self.cost = trace(node), graph.begin + node.cost
+            extra = sum(graph.look_for_way(*change) for change in _changes(node))
+            cost = graph.begin + node.cost + extra
+            if cost < min(self.cost, self.bound):
+                self.solution, self.cost = trace(node), cost
+            if extra == 0.0:
                 return
 
     def _cheapest(
@@ -153,15 +156,13 @@ class PushSearch:
                     self.solution, self.cost, self.bound = (step,), cost, cost
 
 
-def _passable(graph: PushGraph, node: SearchNode) -> bool:
-    """Whether the robot can go from side to side, all along a solution; asks for every change, so
-    that the next solution avoids all that are refused."""
-    possible, before = True, node
-    while before.parent is not None:
-        after = before.parent
-        possible &= graph.may_change(after.pose, before.side, after.side)
-        before = after
-    return possible
+def _changes(node: SearchNode) -> list[tuple[int, int, int]]:
+    """The changes of side of a solution: the pose, and the sides before and after."""
+    found = []
+    while node.parent is not None:
+        found.append((node.parent.pose, node.side, node.parent.side))
+        node = node.parent
+    return found
 
 
 def trace(node: SearchNode) -> tuple[PushStep, ...]:

@@ -1,6 +1,6 @@
 """A way for the robot alone between two poses."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
@@ -93,11 +93,14 @@ def has_way(
     start: Array,
     goal: Array,
     outline: Array,
+    spare: float = 0.0,
 ) -> bool:
     """Whether the robot has a way between two poses ``(3,)`` around an outline ``(n, 2)`` [m].
 
     True also where it stands too close to something to plan a way: it has to back off first.
+    spare: [m] that the passages are wider than ``plan_robot_path`` asks for, by twice as much.
     """
+    settings = replace(settings, safety_distance=settings.safety_distance + spare)
     capsules = np.column_stack(
         [
             outline,
