@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--uncertainty",
         help="as of planar-push experiment; default contest: mild with poses at 50 Hz",
     )
-    parser.add_argument("--world", default="planar", help="planar or pybullet")
+    parser.add_argument("--world", default="planar", help="planar, pybullet or viscous")
     add_study(parser)
 
 

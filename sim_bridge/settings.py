@@ -66,7 +66,9 @@ class MotionCaptureSettings:
 class BridgeSettings:
     """Pace, safety and publishing of the bridge."""
 
-    world: str = bounded("pybullet", doc="Kind of the simulated world: 'pybullet' or 'planar'.")
+    world: str = bounded(
+        "pybullet", doc="Kind of the simulated world: 'pybullet', 'planar' or 'viscous'."
+    )
     lockstep: bool = bounded(
         False,
         doc="Whether the simulation waits in every tick until all commanded robots have answered "

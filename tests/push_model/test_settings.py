@@ -21,6 +21,7 @@ from push_planner.settings import PlannerSettings
 from push_supervisor.settings import SupervisorSettings
 from sim_bridge.planar_world import PlanarSettings
 from sim_bridge.settings import BridgeSettings, MotionCaptureSettings, PhysicsSettings
+from sim_bridge.viscous_world import ViscousSettings
 from swarm_push.agent import AgentSettings
 from swarm_push.crescent_law import CrescentLawSettings
 from swarm_push.object_track import TrackSettings
@@ -40,6 +41,7 @@ ALL = (
     WheelSlipSettings,
     TorqueTrackerSettings,
     PlanarSettings,
+    ViscousSettings,
     PlacementSettings,
     GroupControlSettings,
     GroupPushSettings,
