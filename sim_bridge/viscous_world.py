@@ -26,7 +26,7 @@ class ViscousSettings(PlanarSettings):
     """Step and solver of the planar world, and the drag of the floor."""
 
     drag: float = bounded(
-        220.0,
+        300.0,
         low=1e-3,
         high=1e5,
         doc="Force of the floor on a sliding object over its speed (N s/m). The drag acts evenly "

@@ -90,6 +90,7 @@ def push(seed, out, outline_error):
         return step, float(np.hypot(*(ITEM.mass_pose(world.truth()[0]) - BEND.pose[-1])[:2]))
 
 
+@pytest.mark.long
 def test_a_group_pushes_an_object_whose_outline_is_5_mm_off():
     errors = []
     for seed in range(1, 7):

@@ -36,6 +36,7 @@ def true_margin(item, contacts, twists, friction, com):
     return margin(rays, task_wrenches(moved, surface, surface.radius))
 
 
+@pytest.mark.long
 def test_no_truth_within_the_intervals_has_less_margin():
     random, near, held = np.random.default_rng(1), 0, 0
     for _ in range(40):

@@ -13,6 +13,7 @@ from push_mpc import LtvMpc, MpcSettings, Push, Task, TrackError, TrackerSetting
 from push_mpc.controller import Contact, Held, Reference
 from push_planner import PlannerSettings
 from push_qp import ActiveSetBackend, DaqpBackend, QpSolution
+from tests.samples import mostly_long
 
 DRIVE = DifferentialDrive(0.0205, 0.0265, 6.28)
 GRASP = np.array([0.095, 0.0, 0.0])
@@ -256,7 +257,7 @@ def followed(tracker, trajectory, dt, latency=0.0, seed=None):
             past.append(unicycle_step(past[-1], tick.v, tick.omega, dt / parts))
 
 
-@pytest.mark.parametrize("dt", [0.01, 1 / 60, 1 / 30])
+@pytest.mark.parametrize("dt", mostly_long([1 / 30, 0.01, 1 / 60], 1))
 def test_a_robot_alone_follows_a_reference_that_speeds_up_and_brakes_without_delay(dt):
     plain = TrajectoryTracker(TrackerSettings(), LtvMpc(MpcSettings(feedforward=False), DRIVE))
     tracker, late = make(), 0

@@ -75,6 +75,7 @@ def test_no_push_is_clearer_than_exact_geometry_says(robot, box, shape, number):
     assert lacking.mean() < 0.6 * CELL
 
 
+@pytest.mark.long
 def test_no_post_slips_through_between_two_poses(robot, box):
     """A post of a cell, 3 mm to 20 mm beside what the corner of a turning object sweeps."""
     random = np.random.default_rng(4)

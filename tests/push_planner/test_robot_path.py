@@ -27,6 +27,7 @@ def room(world, circles, radius, points):
     return result
 
 
+@pytest.mark.long
 def test_the_way_keeps_its_distance_away_from_tight_ends(robot):
     """250 worlds, half of the ends tight: beside a wall or a circle."""
     random = np.random.default_rng(1)

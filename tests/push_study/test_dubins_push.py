@@ -83,6 +83,7 @@ def test_goals_in_an_open_room_are_reached(seed):
     assert np.hypot(*off[:2]) <= 0.02 and abs(se2.wrap(off[2])) <= 0.1
 
 
+@pytest.mark.long
 def test_paths_keep_clear_of_the_map_and_the_bends_are_stable():
     """Of 10 random goals beside a wall with an end."""
     room = EnvironmentSpec((3.0, 2.4), boxes=(BoxSpec((0.0, -0.5), (0.1, 1.4)),))

@@ -42,6 +42,7 @@ def trial(task):
     return {"scenario": task.scenario, "seed": task.seed, "success": True, "pid": os.getpid()}
 
 
+@pytest.mark.long
 def test_rows_come_in_the_order_of_the_tasks_and_failures_are_rows(tmp_path):
     tasks = [Task(1), Task(2, "raise"), Task(3, "die"), Task(4)]
     rows = run_trials(trial, tasks, tmp_path / "rows.jsonl", workers=2)
@@ -55,6 +56,7 @@ def test_rows_come_in_the_order_of_the_tasks_and_failures_are_rows(tmp_path):
     assert sorted(line["row"]["seed"] for line in lines) == [1, 2, 3, 4]
 
 
+@pytest.mark.long
 def test_a_worker_stays_and_one_that_dies_costs_only_its_trial(tmp_path):
     tasks = [Task(1), Task(2), Task(3, "die"), Task(4), Task(5, "raise"), Task(6)]
     rows = run_trials(trial, tasks, tmp_path / "rows.jsonl", workers=1)

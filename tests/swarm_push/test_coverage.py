@@ -87,7 +87,7 @@ def random_density(random, parts):
     )
 
 
-@pytest.mark.parametrize("count", mostly_long([1, 20, 100, 2, 3, 5, 8, 60], 2))
+@pytest.mark.parametrize("count", mostly_long([1, 20, 100, 2, 3, 5, 8, 60], 1))
 def test_centroids_agree_with_an_independent_reference_within_a_tenth_of_a_millimetre(count):
     worst = 0.0
     for k in range(6):

@@ -22,7 +22,6 @@ from swarm_push.rim import Rim
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
 from swarm_push.swarm_method import SwarmMethod
 from tests.driving import GroupWorld, drive
-from tests.samples import mostly_long
 
 NAMES = ("a", "b", "c")
 DT = 0.02
@@ -231,7 +230,8 @@ def test_contacts_and_the_way_out_of_them():
     assert turned.at_object.tolist() == [0, 2]  # corners reach out to 0.141 m
 
 
-@pytest.mark.parametrize("seed", mostly_long(range(4), 1))
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(4))
 def test_an_object_goes_round_a_robot_that_died_in_its_way(seed):
     """The dead one stands right before the square, on the way to its target."""
     item, robot = load_object("swarm_square"), load_robot("epuck_ring")

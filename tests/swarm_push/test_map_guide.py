@@ -242,6 +242,7 @@ def made(name, item=SQUARE, count=20, **settings):
     return METHOD.make(arena), Belief({"object": item}, robots)
 
 
+@pytest.mark.long
 def test_a_target_to_which_the_object_does_not_fit_is_refused():
     method, belief = made("transport_two_corners")
     start = np.array([-1.0, -1.0, 0.0])

@@ -97,6 +97,7 @@ def test_odometry_tells_the_motion_of_the_robot_alone():
         assert np.allclose(reading.moved, [0.01, -0.004, 0.05])
 
 
+@pytest.mark.long
 def test_no_robot_uses_a_common_frame_or_a_robot_that_it_does_not_see():
     """200 scenes, two ticks each: moved and turned as a whole, they give every robot the same
     command in its own frame; and a robot that is behind the object may be anywhere there."""
@@ -190,6 +191,7 @@ def test_twenty_robots_bring_an_object_two_metres(name, seed):
     assert seconds * SPEED / math.hypot(1.4, 1.4) < 3.0 and closest > -2e-3
 
 
+@pytest.mark.long
 def test_an_object_that_is_too_heavy_ends_the_job():
     heavy = replace(SQUARE, mass=200.0)
     status, seconds, _ = drive(SQUARE, 1, 60.0, count=6, true=heavy, stalled=8.0)

@@ -91,6 +91,7 @@ def test_the_crescent_is_far_ahead_of_the_printed_law():
     assert times[0] < 0.5 * times[1]
 
 
+@pytest.mark.long
 def test_the_rest_finish_when_four_of_ten_die():
     def kill(job, world):
         if 4.0 <= world.time < 4.02:
@@ -102,6 +103,7 @@ def test_the_rest_finish_when_four_of_ten_die():
     assert job.error is JobError.NONE, job.reason
 
 
+@pytest.mark.long
 def test_a_target_that_is_moved_is_followed():
     def move(job, world):
         if 8.0 <= world.time < 8.02:
@@ -267,6 +269,7 @@ def test_warming_up_leaves_no_trace():
     assert job.last is None and not job.dead and job.index == 0
 
 
+@pytest.mark.long
 def test_discs_that_go_in_any_direction_reach_a_pose():
     item, disc = load_object("swarm_square"), load_robot("disc")
     job = SwarmJob(REGION, item, disc, SwarmJobSettings(), LawSections())

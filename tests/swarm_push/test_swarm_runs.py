@@ -77,9 +77,8 @@ def test_five_millimetres_are_reached_in_95_of_100():
     assert np.mean(done) >= 0.95, [k for k in range(50) if not done[k]]
 
 
-@pytest.mark.parametrize(
-    ("seed", "scale"), mostly_long([(0, 0.9), (14, 1.1), (5, 0.9), (21, 0.912)], 2)
-)
+@pytest.mark.long
+@pytest.mark.parametrize(("seed", "scale"), [(0, 0.9), (14, 1.1), (5, 0.9), (21, 0.912)])
 def test_no_live_robot_is_declared_dead_where_the_outline_is_off(seed, scale):
     assert not run(seed, 25.0, scale)[1]
 
@@ -92,7 +91,9 @@ def test_no_live_robot_is_declared_dead_in_100_runs(robot):
     assert not any(wrong), [k for k in range(100) if wrong[k]]
 
 
-@pytest.mark.parametrize(("seed", "scale", "robot"), [(3, 0.95, "epuck_ring"), (9, 1.0, "disc")])
+@pytest.mark.parametrize(
+    ("seed", "scale", "robot"), mostly_long([(3, 0.95, "epuck_ring"), (9, 1.0, "disc")], 1)
+)
 def test_dead_robots_are_found_out_all_the_same(seed, scale, robot):
     _, wrong, found, _ = run(seed, 25.0, scale, kill=2, robot=robot)
     assert not wrong and found == {"e0", "e1"}
@@ -130,7 +131,8 @@ def jam(seed, count, kill=0, limit=35.0):
     return declared - dead, declared & dead
 
 
-@pytest.mark.parametrize(("seed", "count", "kill"), mostly_long([(0, 16, 0), (1, 20, 2)], 1))
+@pytest.mark.long
+@pytest.mark.parametrize(("seed", "count", "kill"), [(0, 16, 0), (1, 20, 2)])
 def test_no_disc_is_declared_dead_that_is_jammed_at_an_object_that_does_not_move(seed, count, kill):
     wrong, found = jam(seed, count, kill)
     assert not wrong and len(found) == kill

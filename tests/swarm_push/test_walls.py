@@ -93,6 +93,7 @@ def test_no_robot_is_let_into_a_wall():
     assert min(away) > R - 2e-3 and all(free.contains(shapely.Point(p)) for p in points)
 
 
+@pytest.mark.long
 def test_a_track_leads_to_its_target_with_room_for_robots_all_the_way():
     random = np.random.default_rng(4)
     for name, (start, goal) in MAPS.items():

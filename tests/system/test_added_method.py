@@ -48,6 +48,7 @@ def scenario(count=1, mass=0.3, **parameters):
 GOAL = np.array([0.0, 0.0, 0.0])
 
 
+@pytest.mark.long
 def test_its_node_brings_the_object_there_and_page_and_bag_show_it(tmp_path):
     believed = scenario(**{NAME: {"speed": 0.1}})
     bag = tmp_path / "bag"

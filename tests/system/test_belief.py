@@ -58,6 +58,7 @@ def test_planner_and_controller_take_up_a_friction(single):
     assert single.controller.tracker.push.limits == after, "what another source said stays"
 
 
+@pytest.mark.long
 def test_a_push_that_is_expected_to_slip_ends_and_is_planned_anew():
     """A friction that lets the planned bend slip arrives while the robot is still on its way."""
     scenario = load_scenario("line").settings("bridge", world="planar")

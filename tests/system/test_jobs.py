@@ -164,6 +164,7 @@ def test_an_action_goal_takes_over_from_a_goal_on_the_topic(jobs):
     assert jobs.run.observer.trace.object[-1][:2] == pytest.approx(jobs.goal[:2], abs=0.02)
 
 
+@pytest.mark.long
 def test_the_same_goal_again_is_answered_again(jobs):
     assert jobs.run.reach(jobs.goal).error_code == 0
     again = jobs.run.reach(jobs.goal)

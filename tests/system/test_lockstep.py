@@ -113,6 +113,7 @@ def test_equal_seeds_give_equal_runs_to_the_bit_in_another_process(name):
     assert out.stdout.split()[-1] == here
 
 
+@pytest.mark.long
 def test_a_map_of_map_server_is_an_environment(room):
     with LockstepRun(load_scenario(room), quiet=True) as run:
         run.start()

@@ -153,6 +153,7 @@ def test_object_moved_before_the_push_is_noticed(short):
     assert state.error_code == 0 and state.replans >= 1, state.reason
 
 
+@pytest.mark.long
 def test_reset_of_the_bridge_ends_the_job_and_a_new_goal_works(short):
     """FAULTS 12."""
     pushing(short)

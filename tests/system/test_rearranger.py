@@ -173,6 +173,7 @@ def test_what_happens_in_mid_job(run):
         assert np.hypot(*(run.watch.poses[name] - goal)[:2]) < 0.005
 
 
+@pytest.mark.long
 def test_new_goals_replace_those_under_way(run):
     run.send(GOALS)
     run.pushes("a")

@@ -108,6 +108,7 @@ def test_a_goal_for_another_object_stops_the_push():
         assert name == "DETACHING"
 
 
+@pytest.mark.long
 def test_a_wall_behind_the_robot_changes_nothing():
     """Only what lies ahead matters."""
     with runs(load_scenario("short")) as run:

@@ -203,6 +203,7 @@ def test_a_changed_parameter_is_named_with_what_it_changes_first(beginning, tmp_
     assert read_metadata(tmp_path / "again")["pace"] == "lockstep"
 
 
+@pytest.mark.long
 def test_a_bag_that_is_cut_off_is_compared_as_far_as_it_goes(beginning, tmp_path, capsys):
     shutil.copytree(beginning, tmp_path / "cut")
     file = bag_file(tmp_path / "cut")
@@ -213,6 +214,7 @@ def test_a_bag_that_is_cut_off_is_compared_as_far_as_it_goes(beginning, tmp_path
     assert any("equal to the bit" in line for line in told)
 
 
+@pytest.mark.long
 def test_another_revision_is_told_before_anything_runs(beginning, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("push_study.rerun.revision", lambda: "0123456789ab")
     assert main(["rerun", str(beginning)]) == 0

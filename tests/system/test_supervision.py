@@ -292,6 +292,7 @@ def test_a_map_that_covers_the_goal_ends_the_job_with_its_code(run):
     assert run.state.refusal_code == JobError.GOAL_OCCUPIED
 
 
+@pytest.mark.long
 def test_a_world_with_other_bodies_ends_the_job(run):
     """The same scenario again does not; without its object no goal is taken."""
     text = run.run.scenario.text

@@ -11,6 +11,7 @@ from push_ros.qos import COMMAND, STREAM
 from tests.system.worlds import Commander, ring_of, run_until, running
 
 
+@pytest.mark.long
 def test_twenty_robots_with_rings_close_in_on_a_plate(tmp_path):
     """Those that come through touch it, from all sides: there is not room for all twenty. Then one
     half backs off, the other pushes; everything is in the bag."""
