@@ -88,9 +88,13 @@ def wilson(hits: int, count: int) -> tuple[float, float]:
     return float(interval.low), float(interval.high)
 
 
-def mean_interval(values: Array) -> tuple[float, float]:
-    """95 % interval of the mean of values ``(k,)`` (Student's t); no bounds if k is below 3."""
+def mean_interval(values: Array, level: float = 0.95) -> tuple[float, float]:
+    """Interval of the mean of values ``(k,)`` (Student's t); no bounds if k is below 3."""
     if len(values) < 3:
         return -math.inf, math.inf
-    half = float(student.ppf(0.975, len(values) - 1) * values.std(ddof=1) / math.sqrt(len(values)))
+    half = float(
+        student.ppf(0.5 + level / 2.0, len(values) - 1)
+        * values.std(ddof=1)
+        / math.sqrt(len(values))
+    )
     return float(values.mean()) - half, float(values.mean()) + half

@@ -2,8 +2,9 @@
 
 A cell is a method at a contest. Success has Wilson's 95 % interval, Lambda (the charged time over
 that of a robot at full speed on the straight line) Student's over the matches that succeeded. One
-cell leads another when its interval of the share of successes lies above the other's, or where
-these overlap, when its interval of Lambda lies below.
+cell leads another when its interval of the share of successes lies above the other's. Where these
+overlap, it leads when its Lambda is smaller at the problems that both solve: their differences,
+seed by seed, have a mean whose 99 % interval is below zero.
 """
 
 import math
@@ -12,11 +13,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from push_model.arrays import Array
 from push_study.leaderboard.entry import Entry
 from push_study.pool import Row
 from push_study.statistics import mean_interval, wilson
 
 _FEWEST = 5  # values without which no interval is given
+_SURE = 0.99  # level of the interval of differences: equal methods lead each other in 1 of 200
 
 Interval = tuple[float, float]
 
@@ -25,8 +28,9 @@ Interval = tuple[float, float]
 class Cell:
     """A method at a contest. lambda_, path, robot_path, cpu: means over what succeeded (cpu: over
     all), nan where nothing did. path: of the object, over the straight line; robot_path: [m] of a
-    robot. clearance: [m] least of the object over what succeeded. rank: 0 where it is not ranked,
-    or no other ranked method is told the same. leads: names of methods that it leads."""
+    robot. clearance: [m] least of the object over what succeeded. by_seed: Lambda of what
+    succeeded. rank: 0 where it is not ranked, or no other ranked method is told the same. leads:
+    names of methods that it leads."""
 
     contest: str
     entry: Entry
@@ -40,6 +44,7 @@ class Cell:
     robot_path: float
     cpu: float
     clearance: float
+    by_seed: Mapping[int, float]
     rank: int = 0
     leads: tuple[str, ...] = ()
 
@@ -76,6 +81,7 @@ def _cell(contest: str, method: str, entry: Entry, rows: Sequence[Row]) -> Cell 
         _mean(np.array([r["robot_path_m"] for r in good])),
         _mean(np.array(cpu)),
         min((float(r["clearance_m"]) for r in good), default=math.nan),
+        {int(r["seed"]): float(r["lambda"]) for r in good},
     )
 
 
@@ -85,7 +91,14 @@ def leads(first: Cell, second: Cell) -> bool:
         return True
     if second.share[0] > first.share[1]:
         return False
-    return first.lambda_interval[1] < second.lambda_interval[0]
+    slower = difference(first, second)
+    return len(slower) >= _FEWEST and mean_interval(slower, _SURE)[1] < 0.0
+
+
+def difference(first: Cell, second: Cell) -> Array:
+    """``(k,)`` Lambda of one cell minus that of another, at the seeds that both solve."""
+    common = sorted(first.by_seed.keys() & second.by_seed.keys())
+    return np.array([first.by_seed[s] - second.by_seed[s] for s in common])
 
 
 def _ranked(here: list[Cell]) -> list[Cell]:

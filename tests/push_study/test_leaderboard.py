@@ -36,8 +36,8 @@ REFUSER = Entry("refuser", "gibbs", ALL, frozenset({POSES}))
 """It takes no headings, and contests of poses have some."""
 
 
-def row(method, success, value, contest="open-square"):
-    found = {"scenario": contest, "method": method, "seed": 1, "success": success}
+def row(method, success, value, contest="open-square", seed=1):
+    found = {"scenario": contest, "method": method, "seed": seed, "success": success}
     found |= {"cpu_s": 1.0}
     reached = {"lambda": value, "charged_s": value, "path_ratio": 1.0, "clearance_m": 0.1}
     reached["robot_path_m"] = 3.0
@@ -119,8 +119,8 @@ def test_every_match_of_an_environment_has_its_own_start_and_goal(environment):
 def test_ranks_are_among_methods_that_are_told_the_same():
     a, b, c = (Entry(n, "x", t, KIND) for n, t in (("a", ALL), ("b", ALL), ("c", RADIUS)))
     rebuilt = Entry("d", "x", ALL, KIND, reconstructed=True)
-    rows = [row("a", True, 2.0 + 0.01 * k) for k in range(20)]
-    rows += [row("b", True, 3.0 + 0.01 * k) for k in range(20)]
+    rows = [row("a", True, 2.0 + 0.01 * k, seed=k) for k in range(20)]
+    rows += [row("b", True, 3.0 + 0.012 * k, seed=k) for k in range(20)]
     rows += [row("c", k < 1, 9.0) for k in range(20)]
     rows += [row("d", True, 1.0) for _ in range(20)]
     found = {x.entry.name: x for x in cells(rows, named(a, b, c, rebuilt), ["open-square"])}
@@ -142,7 +142,10 @@ def test_a_lead_is_seldom_chance():
 
     def cell(name, p, mean):
         entry = Entry(name, "x", ALL, KIND)
-        made = [row(name, random.random() < p, random.normal(mean, 0.5)) for _ in range(20)]
+        made = [
+            row(name, random.random() < p, random.normal(mean, 0.5), seed=seed)
+            for seed in range(20)
+        ]
         return cells(made, named(entry), ["open-square"])[0]
 
     chance = sum(leads(cell("a", 0.9, 3.0), cell("b", 0.9, 3.0)) for _ in range(300))
@@ -150,6 +153,27 @@ def test_a_lead_is_seldom_chance():
     better = sum(leads(cell("a", 1.0, 3.0), cell("b", 0.3, 3.0)) for _ in range(100))
     faster = sum(leads(cell("a", 1.0, 2.0), cell("b", 1.0, 3.5)) for _ in range(100))
     assert better > 95 and faster > 95
+
+
+def test_lambda_is_compared_at_the_problems_that_both_solve():
+    """Some problems take longer than others; a method that only solves short ones is no faster."""
+    long = np.random.default_rng(3).uniform(1.0, 9.0, 20)
+
+    def cell(name, solves, factor):
+        entry = Entry(name, "x", ALL, KIND)
+        made = [row(name, solves(w), factor * w, seed=k) for k, w in enumerate(long)]
+        return cells(made, named(entry), ["open-square"])[0]
+
+    def always(_):
+        return True
+
+    mine, slower = cell("a", always, 1.0), cell("b", always, 1.1)
+    assert leads(mine, slower) and not leads(slower, mine)
+    assert mine.lambda_interval[1] > slower.lambda_interval[0], "the intervals overlap all the same"
+    short = cell("c", lambda w: w < 6.0, 1.0)
+    assert short.lambda_ < mine.lambda_ and 12 <= short.successes <= 17
+    assert not leads(short, mine) and not leads(mine, short)
+    assert leads(cell("d", lambda w: w < 6.0, 0.9), mine)
 
 
 def test_intervals_cover_what_they_say():
