@@ -295,6 +295,19 @@ def test_equal_seeds_give_equal_runs_in_the_setting_of_the_paper(tmp_path, capsy
     assert "1 of 2" in capsys.readouterr().out
 
 
+@pytest.mark.long
+def test_with_a_drag_the_object_of_the_random_field_creeps_as_recorded(tmp_path):
+    """With Coulomb friction it stands, or moves with the robots."""
+    recorded, rows = paper_of_gibbs.PUBLISHED["gibbs-4"], {}
+    for world in ("planar", "viscous"):
+        task = rival_papers.PaperTask("gibbs-4", 1, str(tmp_path), world, "mild", 150.0)
+        rows[world] = rival_papers.trial(task)
+    assert rows["planar"]["pace_m_s"] < 0.2 * recorded.pace
+    assert rows["planar"]["fastest_m_s"] > 5.0 * recorded.fastest
+    assert 0.5 * recorded.pace < rows["viscous"]["pace_m_s"] < 2.0 * recorded.pace
+    assert rows["viscous"]["fastest_m_s"] < 2.0 * recorded.fastest
+
+
 def test_rays_of_the_random_field_end_at_the_outline():
     """300 rays about random places: none passes through the outline, and none stops before it."""
     random = np.random.default_rng(4)
