@@ -51,6 +51,7 @@ def test_a_push_that_cannot_be_done_says_why_and_moves_nothing():
     assert info["time"] > 0.0, "time passes, or an agent could be refused for ever"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("system", SYSTEMS)
 def test_equal_seeds_give_equal_pushes_whatever_was_before(system):
     ends = []

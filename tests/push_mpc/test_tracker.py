@@ -270,6 +270,7 @@ def test_a_robot_alone_follows_a_reference_that_speeds_up_and_brakes_without_del
     assert late > 25
 
 
+@pytest.mark.long
 def test_motions_end_though_poses_are_later_than_assumed():
     """Noise and latencies of the level ``hard``, where 40 ms are assumed. After its end a reference
     asks for nothing: robots that had ended outside the tolerances swung on for seconds."""

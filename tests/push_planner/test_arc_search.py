@@ -14,7 +14,6 @@ from push_planner.arc_search import ArcSearch
 from push_planner.cost_bound import CostBound
 from push_planner.push_graph import SearchStatistics
 from push_planner.run_ends import RunEnds
-from tests.samples import mostly_long
 
 NODES = 40000
 
@@ -56,7 +55,8 @@ def cost_of(scene, steps):
     return total
 
 
-@pytest.mark.parametrize("backward", mostly_long([True, False], 1))
+@pytest.mark.long
+@pytest.mark.parametrize("backward", [True, False])
 def test_a_path_is_made_of_arcs_that_may_be_pushed(planners, backward):
     found = 0
     for planner in planners:

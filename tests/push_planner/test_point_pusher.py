@@ -75,6 +75,7 @@ def test_the_disc_reaches_its_pushes_without_touching_the_object(count):
         begun += 1
 
 
+@pytest.mark.long
 def test_equal_frames_give_equal_targets():
     task = PointTask(OUTLINE, GYRATION, GOAL, ROOM, 10)
     pose, disc = np.array([0.2, 0.3, -1.0]), np.array([0.4, 0.1, 0.0, 0.0])

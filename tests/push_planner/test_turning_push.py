@@ -137,6 +137,7 @@ def test_of_random_problems_in_environment_1_at_least_95_in_100_are_solved(plann
     assert solved >= 95 and turned > 0
 
 
+@pytest.mark.long
 def test_the_cost_counts_the_slow_push_and_the_way_back_to_the_object(planner):
     time = planner.scene.time
     plan = last(plan_after_preemptive_push(planner, STUCK, GOAL, 1))

@@ -107,11 +107,11 @@ def test_plans_beside_a_body_never_ask_for_a_way_that_the_robot_does_not_have(mo
     assert blind >= 3 and solvable >= 6
 
 
-@pytest.mark.parametrize("body", mostly_long([(-2.895, 0.2037), (-2.491, 0.1537)], 1))
-def test_a_way_is_still_free_if_a_push_ends_a_little_elsewhere(body):
+@pytest.mark.parametrize(("angle", "apart"), mostly_long([(-2.895, 0.2037), (-2.491, 0.1537)], 1))
+def test_a_way_is_still_free_if_a_push_ends_a_little_elsewhere(angle, apart):
     """The cheapest plans lead through passages that are wide enough to the millimetre."""
     scenario = load_scenario("env1-target1")
-    planner, start, here = beside_a_body(scenario, *body)
+    planner, start, here = beside_a_body(scenario, angle, apart)
     plan = solved(planner, start, np.array(scenario.goal), here)
     assert len(plan.segments) > 1
     assert refused_where_pushes_end_elsewhere(planner, plan, np.random.default_rng(6)) == 0

@@ -13,7 +13,6 @@ from swarm_push.crescent import crescent
 from swarm_push.rim import Rim
 from swarm_push.spacing import keep_apart
 from swarm_push.way_round import WayRound
-from tests.samples import mostly_long
 
 R = 0.05
 NAMES = (
@@ -86,7 +85,8 @@ def test_a_crescent_for_nothing_lies_all_round():
     )
 
 
-@pytest.mark.parametrize("name", mostly_long(NAMES, 1))
+@pytest.mark.long
+@pytest.mark.parametrize("name", NAMES)
 def test_ways_round_an_object_come_to_their_ends_without_touching_it(name):
     item = load_object(name)
     body = shapely.Polygon(item.geometry.outline)

@@ -49,6 +49,7 @@ def test_the_field_is_that_of_the_printed_formulas():
     assert seen == 2000
 
 
+@pytest.mark.long
 def test_from_everywhere_it_leads_behind_the_object_and_then_ahead():
     """A mean that follows the field, where the object does not move, ends behind it."""
     v = np.array([1.0, 0.0])

@@ -135,6 +135,7 @@ def test_few_and_degenerate_robots_are_moved_without_ado(layout):
         assert np.abs(wheels).max() <= ROBOT.differential.max_wheel_speed * (1.0 + 1e-9)
 
 
+@pytest.mark.long
 def test_one_robot_pushes_as_far_as_it_can():
     job = job_of(load_object("swarm_octagon"), position_tolerance=0.1)
     job.begin([np.array([0.5, 0.0, math.nan])])

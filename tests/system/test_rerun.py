@@ -177,6 +177,7 @@ def beginning(tmp_path_factory):
     return bag
 
 
+@pytest.mark.long
 def test_one_altered_field_is_found(beginning, tmp_path, capsys):
     def altered(topic, k, data):
         if topic != "/epuck1/controller/status" or k != 200:
@@ -193,6 +194,7 @@ def test_one_altered_field_is_found(beginning, tmp_path, capsys):
     assert "/epuck1/controller/status at 2.0" in line and "(message 200), error_y: " in line
 
 
+@pytest.mark.long
 def test_a_changed_parameter_is_named_with_what_it_changes_first(beginning, tmp_path, capsys):
     words = ["rerun", str(beginning), "--set", "planner.push_speed=0.06"]
     assert main([*words, "--out", str(tmp_path / "again")]) == 1

@@ -204,6 +204,7 @@ def goals_that_cannot_be(goal):
     return [*messages, (JobError.INVALID_GOAL, nan), (JobError.UNKNOWN_FRAME, frame)]
 
 
+@pytest.mark.long
 def test_goals_that_cannot_be_leave_the_job_alone_in_each_of_its_states(run):
     """FAULTS 2 and 22, by topic and by action."""
     run.at_the_object()
@@ -226,6 +227,7 @@ def test_goals_that_cannot_be_leave_the_job_alone_in_each_of_its_states(run):
     assert visited.count("IDLE") == 2 and len(run.plans) >= 1
 
 
+@pytest.mark.long
 def test_the_goal_that_is_pursued_changes_nothing_in_each_state(run):
     """FAULTS 28, by topic and by action, and as a flood."""
     run.at_the_object()
@@ -344,6 +346,7 @@ def crowded(place, **settings):
     return replace(scenario, objects=objects)
 
 
+@pytest.mark.long
 def test_a_body_on_the_goal_is_waited_for():
     with runs(crowded([0.1, 0.04, 0.4], wait=1.0)) as run:
         run.by_topic(run.goal)

@@ -68,6 +68,7 @@ def test_a_scenario_with_a_trajectory_says_how_to_send_it():
         scenario_goals(load_scenario("group-trajectory"))
 
 
+@pytest.mark.long
 def test_a_goal_for_one_team_moves_nobody_of_the_other():
     scenario = load_scenario("two-singles")
     with LockstepRun(scenario, quiet=True) as run:
