@@ -46,7 +46,7 @@ test: lint
 	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not live and not long and not study"
 	$(BIN)/python -m pytest -m "live and not long"
 
-# Slow slices: whole jobs in PyBullet, seeded samples of the studies, faults in real time.
+# Slow tests: whole jobs in PyBullet, seeded samples of the studies, faults in real time.
 test-long: $(STAMP)
 	$(BIN)/python -m pytest -n 3 --dist worksteal -m "long and not live"
 	$(BIN)/python -m pytest -m "long and live"

@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "(docs/results.md); refused if the study has no choice",
     )
     parser.add_argument(
-        "--world", help="pybullet or planar; refused if the study supports only one"
+        "--world", help="pybullet, planar or viscous; refused if the study supports only one"
     )
     add_study(parser)
 

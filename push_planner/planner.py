@@ -18,7 +18,7 @@ from push_planner.cost_bound import CostBound
 from push_planner.gentle import gentler
 from push_planner.guide_path import GuidePath, NoGuidePath, guide_paths, origin_floor
 from push_planner.narrow_way import lined_up
-from push_planner.push_graph import PushGraph, PushStep
+from push_planner.push_graph import PushGraph, PushStep, risk_of
 from push_planner.push_plan import (
     PlanError,
     PlanningFailed,
@@ -96,8 +96,9 @@ class PushPlanner:
         must have a way to the first side; None if unknown. on_side: index of the side on which the
         robot pushes when the plan begins: to go on there takes no change of the side.
 
-        The last report carries the final plan, with the lower bound of all costs. A plan that is
-        reported never costs more than one before it; only the final one may, by ``easing``.
+        The last report carries the final plan, with the lower bound of all costs. The cost of a
+        plan that is reported, with its risk, is never above that of one before it; only that of the
+        final one may be, by ``easing``.
 
         The work is counted, never timed, so that equal inputs and seeds give equal plans.
 
@@ -200,7 +201,7 @@ class PushPlanner:
         start, goal = (self.scene.item.mass_pose(pose) for pose in ends)
         work.left = settings.improvement_expansions
         for number in range(settings.improvement_rounds):
-            bound = (1.0 - _WORTH) * best.cost
+            bound = (1.0 - _WORTH) * best.weighed
             if bound <= work.least or work.left <= 0:
                 break
             if number == 0 and best.cost > (1.0 + _NEAR_BOUND) * work.least:
@@ -214,7 +215,8 @@ class PushPlanner:
                     yield Progress("guide path", best)
                 count, most = settings.improvement_poses, settings.improvement_expansions // 2
                 graph = self._graph(start, goal, guides.all()[-1], 1, count, 0, work)
-                bound = (1.0 - _WORTH) * self._cost(best.segments, work, _HASTE)
+                hasty = self._cost(best.segments, work, _HASTE) + _HASTE * best.risk
+                bound = (1.0 - _WORTH) * hasty
             else:
                 most = work.left
                 between = [self.scene.item.mass_pose(s.object_end) for s in best.segments[:-1]]
@@ -233,7 +235,7 @@ class PushPlanner:
             if search.solution is None:
                 continue
             found = self._assemble(search.solution, ends[1], best.guide, work)
-            if found.cost < best.cost:
+            if found.weighed < best.weighed:
                 best = found
                 yield Progress("improving", best)
         return best
@@ -242,7 +244,7 @@ class PushPlanner:
         self, best: PushPlan, goal: Array, run_ends: RunEnds, work: Work
     ) -> Generator[Progress, None, PushPlan]:
         """Search over arcs below the cost of the best plan. Returns the best plan."""
-        bound, nodes = (1.0 - _WORTH) * best.cost, self.settings.arc_nodes
+        bound, nodes = (1.0 - _WORTH) * best.weighed, self.settings.arc_nodes
         given = work.robot, nodes, work.statistics, work.on_side
         search = pushes_over_arcs(self.scene, run_ends, bound, *given)
         found = yield from _reported(search, "search over arcs", best)
@@ -251,7 +253,7 @@ class PushPlanner:
     def _eased(self, best: PushPlan, work: Work) -> Generator[Progress, None, PushPlan]:
         """The best plan with wider bends, or itself."""
         given = work.robot, work.random, work.statistics, work.on_side
-        search = gentler(self.scene, best.segments, best.cost, *given)
+        search = gentler(self.scene, best.segments, best.weighed, *given)
         found = yield from _reported(search, "wider bends", best)
         return best if found is None else self._assemble(found, best.goal, best.guide, work)
 
@@ -373,7 +375,8 @@ class PushPlanner:
         segments = tuple(self.segment(step) for step in steps)
         clearance, cost = min(s.clearance for s in segments), self._cost(segments, work)
         least, counted = min(work.least, cost), work.counted(guide)
-        return PushPlan(goal, segments, cost, least, clearance, guide, counted)
+        risk = risk_of(self.scene, steps)
+        return PushPlan(goal, segments, cost, least, clearance, guide, counted, risk)
 
 
 def _reported(

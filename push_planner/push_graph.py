@@ -5,7 +5,9 @@ estimates of later searches.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -14,14 +16,12 @@ from numpy.typing import NDArray
 from push_model import se2
 from push_model.arrays import Array
 from push_planner.candidate_poses import Candidates
+from push_planner.drive_risk import TIGHT, drive_risk
 from push_planner.push_curve import PushCurve, shortest_push_curve
 from push_planner.robot_path import has_way
 from push_planner.rough_cost import BLOCKED, guessed_length, pushes_into, rough_costs
 from push_planner.scene import PushScene, PushSide
 from push_planner.shortest_chord import shortest_chords
-
-_STRAY = 0.003  # [m] by which robot and object may end a push elsewhere than planned
-_TIGHT = 3.0  # [s] that a way costs which may then be blocked; a new plan takes about twice that
 
 
 @dataclass
@@ -54,6 +54,13 @@ class PushStep:
     object_end: Array
     clearance: float
     time: float
+
+
+def risk_of(scene: PushScene, steps: Sequence[PushStep]) -> float:
+    """[s] of all drives between pushes, see drive_risk.py; each of them is known to be possible."""
+    changes = [(a, b) for a, b in pairwise(steps) if a.side.index != b.side.index]
+    risks = [drive_risk(scene, b.object_start, a.side, b.side) for a, b in changes]
+    return sum(min(risk, TIGHT) for risk in risks)
 
 
 class PushGraph:
@@ -126,6 +133,7 @@ class PushGraph:
         widest = int((self.window[:, 1] - self.window[:, 0]).max())
         self._sight = np.zeros((*self.room.shape, widest), dtype=np.int8)
         # After a change the robot speeds up anew.
+        self._change_weight = change_weight
         self._changes = change_weight * time.changes
         self._changes += time.begin * (1.0 - np.eye(len(self._changes)))
         self._first = [time.first_change(on_side, s.index, change_weight) for s in scene.sides]
@@ -221,8 +229,8 @@ class PushGraph:
         )
 
     def side_change(self, pose: int, before: int, after: int) -> float:
-        """Cost [s] of changing from one side to another at a pose, and of speeding up again; 0 if
-        the side is the same.
+        """Cost [s] of changing from one side to another at a pose, and of speeding up again, and
+        the risk of the drive, see ``look_for_way``; 0 if the side is the same.
 
         before, after: numbers of the sides; -1 for ``after`` if no push follows.
         """
@@ -240,38 +248,27 @@ class PushGraph:
             return True
         key = (0, -1, side)
         if key not in self._ways:
-            way = self._has_way(0, self._robot, self._behind(0, side))
-            self._ways[key] = 0.0 if way else math.inf
+            scene = self.scene
+            goal = scene.standoff(self.robots[side, 0, :3], scene.sides[side])
+            outline = se2.transform(self.poses[0], scene.shape.outline)
+            given = scene.field, scene.robot, scene.settings, self._robot, goal, outline
+            self._ways[key] = 0.0 if has_way(*given) else math.inf
         return self._ways[key] < math.inf
 
     def may_change(self, pose: int, before: int, after: int) -> bool:
-        """Whether the robot can go round the object at a pose, from one side to another."""
+        """Whether the robot can go round the object at a pose, from one side to another. Computed
+        when it is first asked for, and told by ``side_change`` from then on."""
         self.look_for_way(pose, before, after)
         return self.side_change(pose, before, after) < math.inf
 
-    def look_for_way(self, pose: int, before: int, after: int) -> float:
-        """[s] by which ``side_change`` rises, because it is known now which way the robot has.
-
-        Infinite if there is no way. A way costs more if its passages are so narrow that they are
-        blocked if the push before ends a few millimetres elsewhere. 0 when asked again.
-        """
+    def look_for_way(self, pose: int, before: int, after: int) -> None:
+        """Have ``side_change`` tell the risk of the drive, which is infinite if there is no way;
+        before, it assumes that there is a wide one."""
         key = (pose, before, after)
         if after < 0 or before == after or key in self._ways:
-            return 0.0
-        ends = self._behind(pose, before), self._behind(pose, after)
-        if self._has_way(pose, *ends, _STRAY):
-            self._ways[key] = 0.0
-        else:
-            self._ways[key] = _TIGHT if self._has_way(pose, *ends) else math.inf
-        return self._ways[key]
-
-    def _behind(self, pose: int, side: int) -> Array:
-        return self.scene.standoff(self.robots[side, pose, :3], self.scene.sides[side])
-
-    def _has_way(self, pose: int, start: Array, goal: Array, spare: float = 0.0) -> bool:
-        scene = self.scene
-        outline = se2.transform(self.poses[pose], scene.shape.outline)
-        return has_way(scene.field, scene.robot, scene.settings, start, goal, outline, spare)
+            return
+        sides = self.scene.sides[before], self.scene.sides[after]
+        self._ways[key] = self._change_weight * drive_risk(self.scene, self.poses[pose], *sides)
 
     def push(
         self, first: int, last: int, side: int, statistics: SearchStatistics

@@ -46,7 +46,8 @@ class PlanStatistics:
 @dataclass(frozen=True)
 class PushPlan:
     """cost [s]: g(q) of (2.10), see plan_time.py; cost_bound [s]: no plan of stable pushes
-    costs less, 0 if unknown; clearance [m]; the guide path used.
+    costs less, 0 if unknown; clearance [m]; the guide path used; risk [s]: that searches add to the
+    cost, see drive_risk.py.
 
     goal ``(3,)`` and the segments' poses are of the object's geometric frame, the guide path is of
     its centre of mass.
@@ -59,6 +60,12 @@ class PushPlan:
     clearance: float
     guide: GuidePath
     statistics: PlanStatistics
+    risk: float = 0.0
+
+    @property
+    def weighed(self) -> float:
+        """[s] cost and risk, by which searches compare plans."""
+        return self.cost + self.risk
 
     @property
     def length(self) -> float:

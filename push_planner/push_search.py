@@ -51,10 +51,11 @@ class SearchNode:
 class PushSearch:
     """A search among the poses of a graph. ``run`` does the work in slices.
 
-    bound: [s] a solution must cost less. weight: factor (>= 1) of the estimated cost from the start
-    to a push. expansions: number of pushes that may be tried. expanded: number that were tried.
-    exhausted: whether all pushes that could be part of a solution were tried. solution: the pushes
-    in their order, None if none was found. cost: [s] of the solution.
+    bound: [s] a solution must cost less; all costs contain the risks of drives (drive_risk.py).
+    weight: factor (>= 1) of the estimated cost from the start to a push. expansions: number of
+    pushes that may be tried. expanded: number that were tried. exhausted: whether all pushes that
+    could be part of a solution, or of a cheaper one, were tried. solution: the pushes in their
+    order, None if none was found. cost: [s] of the solution.
     """
 
     graph: PushGraph
@@ -84,11 +85,15 @@ class PushSearch:
             node = yield from self._cheapest(ready, estimate, statistics)
             if node is None:
                 return
-            extra = sum(graph.look_for_way(*change) for change in _changes(node))
-            cost = graph.begin + node.cost + extra
-            if cost < min(self.cost, self.bound):
-                self.solution, self.cost = trace(node), cost
-            if extra == 0.0:
+            changes = _changes(node)
+            assumed = sum(graph.side_change(*change) for change in changes)
+            for change in changes:
+                graph.look_for_way(*change)
+            more = sum(graph.side_change(*change) for change in changes) - assumed
+            cost = graph.begin + node.cost + more
+            if cost < self.bound:
+                self.solution, self.cost, self.bound = trace(node), cost, cost
+            if more == 0.0:
                 return
 
     def _cheapest(

@@ -1,6 +1,6 @@
 """A way for the robot alone between two poses."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
@@ -62,7 +62,7 @@ def plan_robot_path(
     ------
     NoRobotPath
     """
-    found = _find_way(field, robot, settings, start, goal, disc_capsules(circles))
+    found = _find_way(field, robot, settings.safety_distance, start, goal, disc_capsules(circles))
     capsules, ends, body, need = found.capsules, found.ends, found.body, found.need
 
     def keeps(chords: Array, margin: float) -> bool:
@@ -100,7 +100,6 @@ def has_way(
     True also where it stands too close to something to plan a way: it has to back off first.
     spare: [m] that the passages are wider than ``plan_robot_path`` asks for, by twice as much.
     """
-    settings = replace(settings, safety_distance=settings.safety_distance + spare)
     capsules = np.column_stack(
         [
             outline,
@@ -109,7 +108,7 @@ def has_way(
         ]
     )
     try:
-        _find_way(field, robot, settings, start, goal, capsules)
+        _find_way(field, robot, settings.safety_distance + spare, start, goal, capsules)
     except NoRobotPath as error:
         return error.code == RobotPathError.START_BLOCKED
     return True
@@ -118,19 +117,20 @@ def has_way(
 def _find_way(
     field: DistanceField,
     robot: RobotSpec,
-    settings: PlannerSettings,
+    margin: float,
     start: Array,
     goal: Array,
     capsules: Array,
 ) -> _Way:
-    """capsules: ``(n, 5)`` [m] that the axle midpoint stays out of.
+    """margin: [m] that the turning circle keeps. capsules: ``(n, 5)`` [m] that the axle midpoint
+    stays out of.
 
     Raises
     ------
     NoRobotPath
     """
     body = robot.footprint_radius * field.args[2]
-    need = settings.safety_distance * field.args[2]
+    need = margin * field.args[2]
     # A bumper's corners reach farther than the body: with it in between, the robot can still leave.
     least = (robot.body_radius - robot.footprint_radius) * field.args[2]
     capsules = scaled_capsules(capsules, field.args[:2], field.args[2])
@@ -153,7 +153,7 @@ def _find_way(
         raise NoRobotPath(
             RobotPathError.NO_PATH,
             "no path of the robot connects start and goal; the robot needs passages of at least "
-            f"{2.0 * (robot.footprint_radius + settings.safety_distance):.3f} m",
+            f"{2.0 * (robot.footprint_radius + margin):.3f} m",
         )
     corners = np.vstack([start[:2], way[1:-1] * field.spacing + field.args[:2], goal[:2]])
     return _Way(corners, capsules, body, need, ends)

@@ -65,9 +65,9 @@ touches an obstacle does not count as reached. In the contests <code>open-…</c
 the object has come no closer to its goal for {STALLED:.0f} s. Clearance is the least distance of
 the object from obstacles over all matches that reach the goal. <em>Leads</em> names the ranked
 methods of the same information that are worse beyond chance: their interval of the share lies below
-that of the method, or, where these intervals overlap, their Λ is larger at the goals that both
-reach (99 % interval of the mean difference, seed by seed). CPU is that of the whole match, the
-simulation included.
+that of the method; or these intervals overlap, they reach no more goals than the method, and their
+Λ is larger at the goals that both reach (99 % interval of the mean difference, seed by seed, of at
+least five goals). CPU is that of the whole match, the simulation included.
 Two runs with equal seeds differ only in CPU times, and by these in the planning that Λ and time
 contain.</p>"""
 

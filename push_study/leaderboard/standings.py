@@ -3,8 +3,8 @@
 A cell is a method at a contest. Success has Wilson's 95 % interval, Lambda (the charged time over
 that of a robot at full speed on the straight line) Student's over the matches that succeeded. One
 cell leads another when its interval of the share of successes lies above the other's. Where these
-overlap, it leads when its Lambda is smaller at the problems that both solve: their differences,
-seed by seed, have a mean whose 99 % interval is below zero.
+overlap, it leads when it has as many successes at least, and its Lambda is smaller at the problems
+that both solve: the differences, seed by seed, have a mean whose 99 % interval is below zero.
 """
 
 import math
@@ -19,7 +19,7 @@ from push_study.pool import Row
 from push_study.statistics import mean_interval, wilson
 
 _FEWEST = 5  # values without which no interval is given
-_SURE = 0.99  # level of the interval of differences: equal methods lead each other in 1 of 200
+_SURE = 0.99  # level of the interval of differences: one of two equal methods leads in 1 of 100
 
 Interval = tuple[float, float]
 
@@ -89,7 +89,7 @@ def leads(first: Cell, second: Cell) -> bool:
     """Whether one cell is better than another beyond what chance explains."""
     if first.share[0] > second.share[1]:
         return True
-    if second.share[0] > first.share[1]:
+    if first.successes * second.trials < second.successes * first.trials:
         return False
     slower = difference(first, second)
     return len(slower) >= _FEWEST and mean_interval(slower, _SURE)[1] < 0.0

@@ -1,5 +1,7 @@
 """The guess and the search against explicit graphs, the sweep against its definition."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.sparse import csr_array
@@ -14,8 +16,9 @@ from push_planner import (
     shortest_push_curve,
 )
 from push_planner.candidate_poses import Candidates, nearby, runs, scattered
+from push_planner.drive_risk import TIGHT
 from push_planner.guide_path import path_cost
-from push_planner.push_graph import PushGraph, SearchStatistics
+from push_planner.push_graph import PushGraph, SearchStatistics, risk_of
 from push_planner.push_search import PushSearch
 from push_planner.rough_cost import guessed_length
 
@@ -123,6 +126,33 @@ def test_the_search_is_as_good_as_trying_every_push(scene, seed):
         return
     assert best - 1e-9 <= search.cost <= 1.02 * best
     assert statistics.solved < 0.5 * everything.solved
+
+
+def changes_of(steps):
+    return [(a, b) for a, b in pairwise(steps) if a.side.index != b.side.index]
+
+
+@pytest.mark.parametrize(("seed", "count"), [(1, 60), (3, 24), (3, 60)])
+def test_drives_with_little_room_count_more_and_impossible_ones_are_avoided(
+    scene, seed, count, monkeypatch
+):
+    """Where every drive is narrow, each counts 3 s; there is a plan all the same."""
+
+    def searched(has_way):
+        monkeypatch.setattr("push_planner.drive_risk.has_way", has_way)
+        search = PushSearch(graph_of(scene, seed, count), np.inf, 1.0, 10**6)
+        list(search.run(SearchStatistics()))
+        return search
+
+    wide = searched(lambda *_, spare=0.0: True)
+    assert changes_of(wide.solution) and risk_of(scene, wide.solution) == 0.0
+    shut = searched(lambda *_, spare=0.0: False)
+    assert shut.solution is None or not changes_of(shut.solution)
+    narrow = searched(lambda *_, spare=0.0: spare == 0.0)
+    risk = risk_of(scene, narrow.solution)
+    assert risk == TIGHT * len(changes_of(narrow.solution))
+    assert wide.cost - 1e-9 <= narrow.cost - risk
+    assert narrow.cost <= wide.cost + TIGHT * len(changes_of(wide.solution)) + 1e-9
 
 
 def test_a_bound_is_never_exceeded_and_an_exhausted_search_says_so(scene):

@@ -148,8 +148,8 @@ def test_a_lead_is_seldom_chance():
         ]
         return cells(made, named(entry), ["open-square"])[0]
 
-    chance = sum(leads(cell("a", 0.9, 3.0), cell("b", 0.9, 3.0)) for _ in range(300))
-    assert chance < 0.03 * 300
+    pairs = [(cell("a", 0.9, 3.0), cell("b", 0.9, 3.0)) for _ in range(300)]
+    assert sum(leads(a, b) or leads(b, a) for a, b in pairs) < 0.03 * 300
     better = sum(leads(cell("a", 1.0, 3.0), cell("b", 0.3, 3.0)) for _ in range(100))
     faster = sum(leads(cell("a", 1.0, 2.0), cell("b", 1.0, 3.5)) for _ in range(100))
     assert better > 95 and faster > 95
@@ -173,7 +173,13 @@ def test_lambda_is_compared_at_the_problems_that_both_solve():
     short = cell("c", lambda w: w < 6.0, 1.0)
     assert short.lambda_ < mine.lambda_ and 12 <= short.successes <= 17
     assert not leads(short, mine) and not leads(mine, short)
-    assert leads(cell("d", lambda w: w < 6.0, 0.9), mine)
+    fast = cell("d", lambda w: w < 6.0, 0.9)
+    assert not leads(fast, mine), "it reaches fewer goals"
+    assert leads(fast, short)
+    five = sorted(long)[4]
+    for most, known in ((five, True), (five - 1e-9, False)):
+        few = cell("e", lambda w, most=most: w <= most, 1.1)
+        assert leads(cell("f", lambda w, most=most: w <= most, 1.0), few) == known
 
 
 def test_intervals_cover_what_they_say():

@@ -313,7 +313,6 @@ def test_what_a_robot_does_not_see_does_not_change_its_reading():
     assert same > 20
 
 
-@pytest.mark.long
 def test_no_robot_is_commanded_into_a_wall():
     """200 robots at random places: towards the nearest wall at most as fast as the gap allows."""
     near, law = 0, LocalLawSettings()

@@ -152,7 +152,6 @@ def test_a_job_of_another_world_is_not_taken_up(monkeypatch, how, code):
         assert again is not None and again.error_code == 0
 
 
-@pytest.mark.long
 def test_a_cancel_ends_a_job_that_has_not_been_taken_up_yet(monkeypatch):
     goal = np.array(test_swarm.VALUES["goal"])
     with running(monkeypatch, "swarm") as run:
