@@ -74,7 +74,7 @@ ENTRIES = (
         reconstructed=True,
         reproduction=Reproduction(
             "259 ± 16 s with 20 robots, ten trials",
-            "141 ± 77 s, ten trials",
+            "141 ± 77 s, ten trials; 232 ± 71 s with a drag on the object instead of friction",
             False,
             "planar-push experiment rival-papers --scenarios gibbs-20 --trials 10",
         ),
