@@ -94,7 +94,8 @@ def test_plans_beside_a_body_never_ask_for_a_way_that_the_robot_does_not_have(mo
             scenario, random.uniform(-3.1, -2.2), random.uniform(0.15, 0.21)
         )
         with monkeypatch.context() as patch:
-            patch.setattr("push_planner.push_graph.has_way", lambda *_: True)
+            for module in ("push_graph", "drive_risk"):
+                patch.setattr(f"push_planner.{module}.has_way", lambda *_, **__: True)
             plan = solved(planner, start, np.array(scenario.goal), here)
         blind += refused_changes(planner, plan, here) > 0
         try:
