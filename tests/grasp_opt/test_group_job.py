@@ -77,6 +77,7 @@ def test_all_but_one_dead_is_told_as_too_little_force(world):
     assert np.hypot(*world.truth()[0][:2]) < 0.02
 
 
+@pytest.mark.long
 def test_a_dead_robot_that_would_have_to_turn_first_is_found_out(world):
     """On its way to a place, far from the object: it is left, and another one goes."""
     run = Run(world)

@@ -173,6 +173,7 @@ def test_what_the_screen_leaves_out_does_not_hold_the_task():
     assert 0.02 < kept / all_of_them < 0.6
 
 
+@pytest.mark.long
 def test_a_greater_margin_is_asked_for_where_there_is_one():
     """Else half of it, or what there is."""
     item, reached = load_object("plate_ellipse"), []
@@ -199,6 +200,7 @@ def test_no_placement_costs_less_than_the_lower_bound(name, count):
     assert lowers[0] <= lowers[1] + 1e-12 <= best.cost * (1 + 1e-6)
 
 
+@pytest.mark.long
 def test_the_best_known_placement_of_two_is_near_the_lower_bound():
     placer = Placer(plates()["ellipse"], SIX["polynomial-2"], 2, 0.05, FEW)
     best = placer.best()

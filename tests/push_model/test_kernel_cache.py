@@ -166,6 +166,7 @@ for module in list(sys.modules.values()):
 """
 
 
+@pytest.mark.long
 def test_stamps_do_not_depend_on_the_order_of_imports_or_of_sets():
     modules = ["push_planner", "swarm_push.swarm_job", "grasp_opt.placement", "push_mpc"]
     found = [

@@ -40,6 +40,7 @@ def within(rng, belief):
     return [float(rng.uniform(i.low, i.high)) for i in intervals]
 
 
+@pytest.mark.long
 def test_it_is_stable_for_all_of_a_hundred_random_beliefs(robot, box):
     rng = np.random.default_rng(1)
     width, distance = robot.flat_bumper.width, robot.push_distance

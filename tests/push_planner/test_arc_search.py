@@ -91,7 +91,9 @@ def test_a_path_is_made_of_arcs_that_may_be_pushed(planners, backward):
     assert found > 4
 
 
-@pytest.mark.parametrize("count", [4, pytest.param(60, marks=pytest.mark.study)])
+@pytest.mark.parametrize(
+    "count", [pytest.param(4, marks=pytest.mark.long), pytest.param(60, marks=pytest.mark.study)]
+)
 def test_its_pushes_join_start_and_goal_without_a_collision(planners, count):
     found = several = 0
     for planner in planners:

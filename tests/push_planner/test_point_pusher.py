@@ -10,7 +10,6 @@ from push_model.settings import SettingsError
 from push_planner.point_pusher import PointPusher, PointPushSettings, PointTask
 from push_study.experiments import pusht
 from push_study.experiments.pusht import CENTRE, DISC, GYRATION, SCALE, T
-from tests.samples import mostly_long
 
 OUTLINE, ROOM = T - CENTRE, (0.001, 0.511)
 GOAL = np.array([0.256, 0.256, 1.0])
@@ -51,7 +50,8 @@ def test_it_is_brought_there_from_anywhere():
     assert sum(f < 200 for f in frames) >= 19 and np.median(frames) < 100
 
 
-@pytest.mark.parametrize("count", mostly_long([2, 40], 1))
+@pytest.mark.long
+@pytest.mark.parametrize("count", [2, 40])
 def test_the_disc_reaches_its_pushes_without_touching_the_object(count):
     """Random plans, carried out until the push begins: on the way nothing is touched."""
     random, item, begun = np.random.default_rng(3), body(OUTLINE, GYRATION), 0

@@ -84,6 +84,7 @@ def test_hundreds_of_scenes_are_solved(name):
     assert solved == 30
 
 
+@pytest.mark.long
 def test_every_move_has_a_plan_of_its_own():
     """Planned anew with the others as obstacles, each move has one."""
     scenario = load_scenario("rearrange")

@@ -105,6 +105,7 @@ def test_damage_outside_of_the_chunks_is_noticed(bag):
     assert "the checksum of the whole file is wrong" in fault.text
 
 
+@pytest.mark.long
 def test_random_damage_is_never_silent_and_never_a_traceback(bag, tmp_path):
     """Runs of random or zero bytes anywhere, also in a file that is cut off as well."""
     random = np.random.default_rng(5)

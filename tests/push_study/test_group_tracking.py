@@ -16,7 +16,6 @@ from push_study.experiments.group_tracking import THETA0, TrackingTask
 from push_study.given_grasp import GraspSettings, choose
 from push_study.study import StudyOptions, run_study
 
-QUICK = [("double-bend", 2, "optimised")]
 ALL = itertools.product(group_tracking.SCENARIOS, group_tracking.ROBOTS, group_tracking.PLACEMENTS)
 FREE = ("planning_cpu_s", "charged_s")
 """Measures that depend on the machine."""
@@ -26,10 +25,8 @@ def task(tmp_path, scenario="double-bend", robots=2, placement="even", world="pl
     return TrackingTask(scenario, 3, str(tmp_path), robots, placement, world, "mild")
 
 
-@pytest.mark.parametrize(
-    ("scenario", "robots", "placement"),
-    [p if p in QUICK else pytest.param(*p, marks=pytest.mark.long) for p in ALL],
-)
+@pytest.mark.long
+@pytest.mark.parametrize(("scenario", "robots", "placement"), list(ALL))
 def test_every_task_is_tracked_in_the_planar_world(tmp_path, scenario, robots, placement):
     row = group_tracking.trial(task(tmp_path, scenario, robots, placement))
     assert row["success"] and row["collision_ticks"] == 0, row["reason"]

@@ -101,6 +101,7 @@ def test_the_global_input_keeps_a_direction_for_a_second():
     assert changes.sum() == 2
 
 
+@pytest.mark.long
 def test_the_global_input_leads_the_mean_round_the_object():
     """From in front of it to behind it, without running into it, from six places."""
     toward = (np.array(TARGET) - HERE[:2]) / np.hypot(*(np.array(TARGET) - HERE[:2]))

@@ -66,6 +66,7 @@ def test_a_worker_stays_and_one_that_dies_costs_only_its_trial(tmp_path):
     assert not Path(f"/proc/{first}").exists() and not Path(f"/proc/{second}").exists()
 
 
+@pytest.mark.long
 def test_a_study_goes_on_and_repeats_nothing_that_is_finished(tmp_path, capsys):
     journal = tmp_path / "rows.jsonl"
     done = run_trials(trial, [Task(1), Task(2, "die"), Task(3)], journal, workers=1)

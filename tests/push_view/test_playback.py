@@ -80,6 +80,7 @@ def test_a_long_series_keeps_its_peaks():
     assert "limit" not in _one("m", np.arange(3.0), np.ones(3))
 
 
+@pytest.mark.long
 def test_extreme_numbers_in_a_bag_are_left_out_or_kept(scenario, tmp_path):
     """What somebody recorded is a valid message, and need not be valid JSON."""
     bag = Bag(tmp_path / "bag", crowd(scenario, 1, 1))

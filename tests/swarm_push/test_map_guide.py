@@ -97,6 +97,7 @@ def route(name, start, target, radius=0.25, **settings):
     )
 
 
+@pytest.mark.long
 def test_routes_lead_to_the_target_and_leave_the_object_room():
     """40 random pairs of places: a disc has its room all along; every robot finds the same."""
     for seed in range(40):

@@ -27,10 +27,8 @@ def placed(name, seed, count):
     return drawn(name, SQUARE, seed, count, turned=False)[2]
 
 
-@pytest.mark.parametrize(
-    ("factor", "most", "turned"),
-    [(1.0, 0.03, 0.03), pytest.param(3.0, 0.06, 0.06, marks=pytest.mark.long)],
-)
+@pytest.mark.long
+@pytest.mark.parametrize(("factor", "most", "turned"), [(1.0, 0.03, 0.03), (3.0, 0.06, 0.06)])
 def test_a_robot_keeps_its_place_on_the_map(factor, most, turned):
     """200 robots walk 40 steps of 4 cm and turn: with errors at the start and of the sensor, and
     with three times these."""

@@ -176,6 +176,7 @@ def push_heavy(mass, **changes):
         return job, world.time, float(np.hypot(*world.truth()[0][:2]))
 
 
+@pytest.mark.long
 def test_an_object_that_its_robots_cannot_move_is_given_up_soon_and_no_robot_is_blamed():
     """6.5 N are needed, three robots have 5.9 N."""
     job, time, moved = push_heavy(2.2)

@@ -72,6 +72,7 @@ def test_its_node_brings_the_object_there_and_page_and_bag_show_it(tmp_path):
     assert write_report(bag, tmp_path / "report", animate=False)["position_error_m"] < 0.06
 
 
+@pytest.mark.long
 def test_a_study_runs_it_in_its_uncertainty():
     outcome = run_team(NAME, scenario(), Task((GOAL,)), uncertainty("mild"), 1, 60.0)
     assert outcome.success and 0.0 < outcome.error[0] < 0.06 and outcome.seconds > 3.0

@@ -40,6 +40,7 @@ def single():
         yield run
 
 
+@pytest.mark.long
 def test_planner_and_controller_take_up_a_friction(single):
     """Half the friction: half the stable curvature, of the push under way and of the next plan."""
     item = next(iter(single.scenario.objects))
@@ -120,6 +121,7 @@ def group_scenario(two=False):
     return scenario_from_mapping(values, "group", "test")
 
 
+@pytest.mark.long
 def test_a_group_is_placed_by_the_certified_margin_and_tells_it():
     scenario = group_scenario()
     mu = scenario.objects["plate"][0].contact_friction
@@ -220,6 +222,7 @@ def reach_with_late_centre(system, scenario, name, goal, when, most):
         assert np.hypot(*off[:2]) < most, 1e3 * off[:2]
 
 
+@pytest.mark.long
 def test_a_group_pushes_on_with_the_friction_that_it_is_told():
     scenario = group_scenario().settings("group", push__stop_before_slip=False)
     with LockstepRun(scenario, quiet=True, system="group") as run:

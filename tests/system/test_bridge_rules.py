@@ -180,6 +180,7 @@ def test_commands_for_many_are_checked_one_by_one():
         assert 2 * 28 <= refused <= 2 * 30
 
 
+@pytest.mark.long
 def test_the_world_waits_for_any_time_and_not_for_who_has_left():
     """FAULTS 30: a late answer changes nothing; a commander that is gone stops its robots."""
     values = discs(3)

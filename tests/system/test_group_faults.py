@@ -136,6 +136,7 @@ def test_the_optimizer_that_is_gone_ends_the_job_after_a_while(run, monkeypatch)
     assert told and max(speed for _, speed in told) == 0.0
 
 
+@pytest.mark.long
 def test_the_world_stands_still_for_a_while_and_the_job_goes_on(run):
     """Row 24."""
     client = run.observer.create_client(SetBool, "/bridge/pause")

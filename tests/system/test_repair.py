@@ -142,6 +142,7 @@ def test_a_wall_further_on_is_gone_round_without_a_stop():
         assert run.run.observer.trace.collisions == 0
 
 
+@pytest.mark.long
 def test_cancel_during_a_repair_stops_the_robot():
     with runs(load_scenario("short")) as run:
         run.by_topic(run.goal)

@@ -283,6 +283,7 @@ def test_a_new_map_is_minded_at_once(run, name):
     assert not any((low < p[:2]).all() and (p[:2] < high).all() for p in item)
 
 
+@pytest.mark.long
 def test_a_map_that_covers_the_goal_ends_the_job_with_its_code(run):
     run.by_topic(run.goal)
     run.pushing()
