@@ -76,7 +76,7 @@ docs: $(STAMP)
 pictures: $(STAMP)
 	$(BIN)/python -m tests.pictures
 
-# Rooms of Bench-Push for planar-push experiment bench-push: its packages exclude versions of ours.
+# Rooms of Bench-Push for the studies bench-push and box-delivery; its packages exclude versions of ours.
 # benchnpin asks for PyTorch and more, which these rooms do not use.
 BENCHPUSH := .venv-benchpush
 benchpush: $(VENV)/bin/python

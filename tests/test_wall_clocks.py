@@ -85,7 +85,7 @@ DECIDES_NOTHING = {
     "push_record/player.py": "plays a bag; there is no bridge beside it",
     "push_record/recorder.py": "stamps of a live bag",
     "push_study/experiments/pusht.py:trial": COST,
-    "push_study/experiments/bench_push.py:trial": COST,
+    "push_study/bench_push/episode.py:run": COST,
     "push_study/leaderboard/match.py:play": COST,
     "push_study/progress.py": PERSON,
     "push_ros/method_node.py:MethodNode.__init__": LIVE,

@@ -5,8 +5,7 @@ boxes. The planner of this project is also told the walls and columns, which GTS
 """
 
 import math
-from collections import deque
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from push_model.outlines import overlap
 from push_planner.area_clearing import AreaClearing
 from push_planner.covering_tour import covering_tour
 from push_planner.sweeps import Area, Front, Sweep
+from push_study.bench_push.robot import EASE, Blocked, Policy, Robot, Seen, Steps
 
 FRONT = Front(0.72, 0.72, 1.22)
 """Of the robot of benchnpin's area clearing: a flat bumper, 2.4 m wide, with rounded corners."""
@@ -24,25 +24,16 @@ _SPARE = 1.05  # [m] that a box needs beyond an edge
 _MOST = 100  # plans of an episode
 _MOVED = 0.3  # [m] of a box after which its sweep is planned anew
 _AT = 0.03  # [m] from a point at which it is reached
-_TURNED = 0.012  # [rad], likewise
-_EASE = 0.2  # [s] in which errors are to vanish
-_PATIENCE = 15  # actions in which a robot that is not blocked moves by over 1 cm or 0.02 rad
-_BACK = 8  # actions for which one that is blocked drives back
-
-Action = tuple[float, float]
-"""Speed and turn rate, of the greatest ones."""
-Policy = Generator[Action, dict[str, Any], None]
-"""Yields actions, and is sent what the room tells after each. Ends when it has no more to do."""
 
 
-def sweeping(room: dict[str, Any]) -> Policy:
+def sweeping(room: Seen) -> Policy:
     """Sweeps of ``push_planner.area_clearing``, planned anew one by one; within the action space,
     which is [-1, 1] for both actions. room: as told after a reset."""
     fixed = tuple(np.array(outline) for outline in room["fixed"])
     edges = tuple(np.array(edge) for edge in room["edges"])
     limits = np.array(room["limits"])
     area = Area(np.array(room["area"]), edges, limits, fixed, _SPARE)
-    planner, robot, seen = AreaClearing(area, FRONT), _Robot(room), room
+    planner, robot, seen = AreaClearing(area, FRONT), _Sweeper(room), room
     for _ in range(_MOST):
         boxes = [np.array(box) for box in seen["boxes"]]
         planned = planner.next_sweep(np.array(seen["pose"]), boxes)
@@ -59,11 +50,11 @@ def sweeping(room: dict[str, Any]) -> Policy:
                 seen = yield from robot.face(seen, sweep.heading)
                 if not moved(sweep, boxes, seen):
                     seen = yield from robot.sweep(seen, sweep, area.outline)
-        except _Blocked as blocked:
+        except Blocked as blocked:
             seen = yield from robot.back_off(blocked.seen)
 
 
-def moved(sweep: Sweep, boxes: Sequence[Array], seen: dict[str, Any]) -> bool:
+def moved(sweep: Sweep, boxes: Sequence[Array], seen: Seen) -> bool:
     """Whether a box that a sweep takes is no longer where it was: the robot has pushed it on its
     way. Of shifts, which take none, this is not known. boxes: outlines ``(k, 2)`` [m] when the
     sweep was planned; seen: as the room tells now."""
@@ -73,24 +64,13 @@ def moved(sweep: Sweep, boxes: Sequence[Array], seen: dict[str, Any]) -> bool:
     )
 
 
-class _Blocked(Exception):
-    """The robot is told to move and does not. seen: what the room told last."""
+class _Sweeper(Robot):
+    """Drives to points and along sweeps, and turns on the spot between."""
 
-    def __init__(self, seen: dict[str, Any]) -> None:
-        super().__init__("the robot is blocked")
-        self.seen = seen
+    def __init__(self, room: Seen) -> None:
+        super().__init__(room, room["speed"], room["turn"] / 2.0)  # half, as benchnpin takes it
 
-
-class _Robot:
-    """Drives to points and along sweeps, and turns on the spot between; raises _Blocked."""
-
-    def __init__(self, room: dict[str, Any]) -> None:
-        self._speed, self._turn = room["speed"], room["turn"] / 2.0  # half, as benchnpin takes it
-        self._told, self._poses = (0.0, 0.0), deque([np.array(room["pose"])], _PATIENCE)
-
-    def drive(
-        self, seen: dict[str, Any], point: Array, then: float | None
-    ) -> Generator[Action, dict[str, Any], dict[str, Any]]:
+    def drive(self, seen: Seen, point: Array, then: float | None) -> Steps:
         """Ahead or back to a point, whichever needs fewer turns, also to the heading ``then``."""
         away = point - seen["pose"][:2]
         if np.hypot(*away) < 2.0 * _AT:
@@ -112,11 +92,9 @@ class _Robot:
             nearest = min(nearest, distance)
             error = se2.wrap(math.atan2(away[1], away[0]) + back - seen["pose"][2])
             turn = 2.0 * error if distance > 5.0 * _AT else 0.0
-            seen = yield from self._act(sign * distance / _EASE, turn)
+            seen = yield from self.act(sign * distance / EASE, turn)
 
-    def sweep(
-        self, seen: dict[str, Any], sweep: Sweep, area: Array
-    ) -> Generator[Action, dict[str, Any], dict[str, Any]]:
+    def sweep(self, seen: Seen, sweep: Sweep, area: Array) -> Steps:
         """Straight on until all boxes of the sweep have left, a quarter of a metre too far at
         most."""
         out = np.array([math.cos(sweep.heading), math.sin(sweep.heading)])
@@ -131,38 +109,10 @@ class _Robot:
             beside = float((seen["pose"][:2] - sweep.start) @ across)
             course = sweep.heading - min(max(0.5 * beside, -0.3), 0.3)
             turn = 1.5 * se2.wrap(course - seen["pose"][2])
-            seen = yield from self._act(self._speed, turn)
-
-    def back_off(self, seen: dict[str, Any]) -> Generator[Action, dict[str, Any], dict[str, Any]]:
-        """Undo the last command for a while."""
-        ahead, turn = self._told
-        for _ in range(_BACK):
-            seen = yield -ahead, -turn
-        self._poses.clear()
-        return seen
-
-    def face(
-        self, seen: dict[str, Any], heading: float
-    ) -> Generator[Action, dict[str, Any], dict[str, Any]]:
-        """Turn on the spot to a heading [rad]."""
-        while abs(error := se2.wrap(heading - seen["pose"][2])) > _TURNED:
-            seen = yield from self._act(0.0, 0.9 * error / _EASE)
-        return seen
-
-    def _act(self, speed: float, turn: float) -> Generator[Action, dict[str, Any], dict[str, Any]]:
-        """One action, of [m/s] and [rad/s]."""
-        ahead, round_ = speed / self._speed, turn / self._turn
-        self._told = min(max(ahead, -1.0), 1.0), min(max(round_, -1.0), 1.0)
-        seen = yield self._told
-        self._poses.append(np.array(seen["pose"]))
-        if len(self._poses) == _PATIENCE:
-            moved = np.ptp(self._poses, axis=0)
-            if moved[:2].max() < 0.015 and moved[2] < 0.025:  # one step of rounding is no motion
-                raise _Blocked(seen)
-        return seen
+            seen = yield from self.act(self.speed, turn)
 
 
-def gtsp(room: dict[str, Any]) -> Policy:
+def gtsp(room: Seen) -> Policy:
     """The policy GTSP of Bench-Push, rebuilt: one push a box, the tour once at the start.
 
     Pushes, costs and control are those of its published code (IvanIZ/BenchPush, e9f865b); its
@@ -173,16 +123,14 @@ def gtsp(room: dict[str, Any]) -> Policy:
     yield from _gtsp_tour(room, room)
 
 
-def gtsp_again(room: dict[str, Any]) -> Policy:
+def gtsp_again(room: Seen) -> Policy:
     """GTSP, planned anew at the end of each tour, for the boxes that are still in the area."""
     seen, area = room, np.array(room["area"])
     while any(_in(area, box) for box in seen["boxes"]):
         seen = yield from _gtsp_tour(room, seen)
 
 
-def _gtsp_tour(
-    room: dict[str, Any], seen: dict[str, Any]
-) -> Generator[Action, dict[str, Any], dict[str, Any]]:
+def _gtsp_tour(room: Seen, seen: Seen) -> Steps:
     """One tour through the boxes that are in the area."""
     area, (x, y, theta) = np.array(room["area"]), seen["pose"]
     inner = [p for p, b in zip(seen["pushes"], seen["boxes"], strict=True) if _in(area, b)]

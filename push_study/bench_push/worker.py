@@ -1,10 +1,10 @@
 """A room of benchnpin for another process: a line of JSON in, a line of JSON out.
 
-Runs with the Python of another environment, without this project. The room is not changed; its
-observations as images are left out, and its actions are velocities. Asked for ``reset``, it tells
-the room and where everything is; asked for ``step``, where everything is then, and the measures of
-benchnpin once the episode is over. Each time it tells the pushes among which the policy GTSP
-chooses.
+Runs with the Python of another environment, without this project. Physics and measures of the room
+are not changed. Its observations as images and the rewards of box delivery are left out, for they
+would take most of the time, and its actions are velocities. Asked for ``reset``, it tells the room
+and where everything is; asked for ``step``, where everything is then, and the measures of benchnpin
+once the episode is over.
 """
 
 import json
@@ -16,8 +16,10 @@ import warnings
 from typing import Any
 
 LIMIT = 2000
-"""Actions from one cleared box to the next at most, as in the evaluation of the policy GTSP in
-IvanIZ/BenchPush (e9f865b)."""
+"""Actions from one box that is cleared or delivered to the next at most, as in the evaluation of
+the policy GTSP in IvanIZ/BenchPush (e9f865b)."""
+DELIVERY = ("small_empty", "small_columns", "large_columns", "large_divider")
+"""Rooms of box delivery; the others are of area clearing."""
 
 
 def main() -> None:
@@ -27,61 +29,136 @@ def main() -> None:
     os.environ.update(MPLBACKEND="Agg", SDL_VIDEODRIVER="dummy")
     warnings.simplefilter("ignore")
     from benchnpin.common.metrics.task_driven_metric import TaskDrivenMetric
-    from benchnpin.environments.area_clearing.area_clearing import AreaClearingEnv
-    from shapely import Polygon
 
-    env: Any = None
+    task: Any = None
     metric: Any = None
     for line in sys.stdin:
         ask = json.loads(line)
         if "reset" in ask:
-            random.seed(ask["reset"])
-            if env is None:
-                agent, sim = {"action_type": "velocity"}, {"t_max": LIMIT}
-                room = {"env": ask["room"], "low_dim_state": True, "render": {"show": False}}
-                env = AreaClearingEnv({**room, "agent": agent, "sim": sim})
-            _, info = env.reset()
-            metric = TaskDrivenMetric("", env.cfg.agent.mass)
+            kind = Delivery if ask["room"] in DELIVERY else Clearing
+            task = kind(ask["room"], ask["reset"])
+            _, info = task.env.reset()
+            metric = TaskDrivenMetric("", task.env.cfg.agent.mass)
             metric.reset(info)
-            tell = _room(env, info)
+            tell = task.room(info)
         else:
-            _, reward, terminated, truncated, info = env.step(ask["step"])
+            _, reward, terminated, truncated, info = task.env.step(task.action(*ask["step"]))
             over = terminated or truncated
             metric.update(info=info, reward=reward, eps_complete=over)
-            tell = {"cleared": info["box_count"], "over": over}
+            tell = {"done": task.done(info), "over": over}
             if over:
                 tell["share"] = metric.success_rates[-1]
                 tell["efficiency"] = metric.efficiency_scores[-1]
                 tell["effort"] = metric.effort_scores[-1]
                 tell["path_m"] = metric.total_robot_dist
-        tell["pose"], tell["boxes"] = info["state"], info["obs"]
-        area = Polygon(env.boundary_vertices)
-        tell["pushes"] = [_pushes(box, env.boundary_goals, area) for box in info["obs"]]
+        tell["pose"] = info["state"]
+        tell |= task.boxes(info)
         answers.write(json.dumps(tell, default=_plain) + "\n")
         answers.flush()
 
 
-def _room(env: Any, info: dict[str, Any]) -> dict[str, Any]:
-    """What does not change in an episode. Walls and columns are as large as in the physics, which
-    rounds their corners by a radius."""
-    from benchnpin.common.geometry.polygon import create_polygon_from_line
+class Clearing:
+    """Boxes that are to be pushed out of an area. It also tells the pushes among which the policy
+    GTSP chooses."""
+
+    def __init__(self, name: str, seed: int) -> None:
+        from benchnpin.environments.area_clearing.area_clearing import AreaClearingEnv
+
+        random.seed(seed)
+        agent, sim = {"action_type": "velocity"}, {"t_max": LIMIT}
+        room = {"env": name, "low_dim_state": True, "render": {"show": False}}
+        self.env = AreaClearingEnv({**room, "agent": agent, "sim": sim})
+
+    def action(self, speed: float, turn: float) -> tuple[float, float]:
+        """Of the greatest speed and turn rate, as the room takes it."""
+        return speed, turn
+
+    def done(self, info: dict[str, Any]) -> int:
+        """Boxes that are out."""
+        return int(info["box_count"])
+
+    def boxes(self, info: dict[str, Any]) -> dict[str, Any]:
+        """Outlines, and a list of pushes of each box."""
+        from shapely import Polygon
+
+        area = Polygon(self.env.boundary_vertices)
+        pushes = [_pushes(box, self.env.boundary_goals, area) for box in info["obs"]]
+        return {"boxes": info["obs"], "pushes": pushes}
+
+    def room(self, info: dict[str, Any]) -> dict[str, Any]:
+        """What does not change in an episode. Walls and columns are as large as in the physics,
+        which rounds their corners by a radius."""
+        from benchnpin.common.geometry.polygon import create_polygon_from_line
+
+        env = self.env
+        fixed = [*map(create_polygon_from_line, env.walls), *env.static_obstacles]
+        inner, outer = env.wall_shapes[: len(env.walls)], env.wall_shapes[len(env.walls) :]
+        shapes = (*inner, *env.static_obs_shapes)
+        rim = max(shape.radius for shape in outer)
+        return {
+            "area": env.boundary_vertices,
+            "limits": [max(abs(v[k]) for v in env.outer_boundary_vertices) - rim for k in range(2)],
+            "edges": [list(line.coords) for line in env.boundary_goals],
+            "fixed": [_grown(o, s.radius) for o, s in zip(fixed, shapes, strict=True)],
+            "speed": env.target_speed,
+            "turn": env.max_yaw_rate_step,
+        }
+
+
+class Delivery:
+    """Boxes that are to be pushed into a receptacle."""
+
+    def __init__(self, name: str, seed: int) -> None:
+        from benchnpin.environments.box_delivery.box_delivery_env import BoxDeliveryEnv
+
+        misc = {"random_seed": seed, "inactivity_cutoff": LIMIT}
+        room = {"agent": {"action_type": "velocity"}, "render": {"show": False}, "misc": misc}
+        self.env = BoxDeliveryEnv({**room, "env": {"obstacle_config": name}})
+        self.env.generate_observation = lambda done=False: None
+        self.env.shortest_path_distance = lambda *_: 0.0  # only rewards use it
+
+    def action(self, speed: float, turn: float) -> tuple[float, float]:
+        """Of the greatest speed and turn rate, as the room takes it: in m/s and rad/s. The room
+        bounds the speed; of the turn rate, the action space says 1 rad/s."""
+        return speed * self.env.target_speed, turn
+
+    def done(self, info: dict[str, Any]) -> int:
+        """Boxes that are delivered."""
+        return int(info["cumulative_cubes"])
+
+    def boxes(self, info: dict[str, Any]) -> dict[str, Any]:
+        """Outlines; none of a box that is delivered."""
+        found: list[Any] = [None] * len(info["box_completed_statuses"])
+        for box in self.env.boxes:
+            found[box.idx] = [list(box.body.local_to_world(v)) for v in box.get_vertices()]
+        return {"boxes": found}
+
+    def room(self, info: dict[str, Any]) -> dict[str, Any]:
+        """What does not change in an episode. What is fixed is as large as in the physics."""
+        env, fixed = self.env, []
+        for shape in env.boundaries:
+            if shape.label not in ("wall", "receptacle"):
+                outline = [list(shape.body.local_to_world(v)) for v in shape.get_vertices()]
+                fixed.append(_grown(outline, shape.radius))
+        (x, y), half = env.receptacle_position, 0.5 * env.receptacle_size
+        corners = ((-half, -half), (half, -half), (half, half), (-half, half))
+        return {
+            "limits": [0.5 * env.room_length, 0.5 * env.room_width],
+            "fixed": fixed,
+            "receptacle": [[x + a, y + b] for a, b in corners],
+            "robot": [list(v) for v in env.robot.get_vertices()],
+            "box": env.cfg.boxes.box_size,
+            "grown": env.boxes[0].radius,
+            "speed": env.target_speed,
+            "turn": 1.0,
+        }
+
+
+def _grown(outline: Any, radius: float) -> list[Any]:
+    """By a radius, with sharp corners."""
     from shapely import Polygon
 
-    fixed = [*map(create_polygon_from_line, env.walls), *env.static_obstacles]
-    inner, outer = env.wall_shapes[: len(env.walls)], env.wall_shapes[len(env.walls) :]
-    grown = [
-        list(Polygon(outline).buffer(shape.radius, join_style=2).exterior.coords)[:-1]
-        for outline, shape in zip(fixed, (*inner, *env.static_obs_shapes), strict=True)
-    ]
-    rim = max(shape.radius for shape in outer)
-    return {
-        "area": env.boundary_vertices,
-        "limits": [max(abs(v[k]) for v in env.outer_boundary_vertices) - rim for k in range(2)],
-        "edges": [list(line.coords) for line in env.boundary_goals],
-        "fixed": grown,
-        "speed": env.target_speed,
-        "turn": env.max_yaw_rate_step,
-    }
+    return list(Polygon(outline).buffer(radius, join_style=2).exterior.coords)[:-1]
 
 
 def _pushes(box: Any, lines: Any, area: Any) -> list[list[list[float]]]:
