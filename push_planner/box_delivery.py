@@ -1,21 +1,22 @@
 """Delivers boxes to a receptacle: the next box, the way behind it, and the way to push it along.
 
 A robot with a flat front pushes square boxes one by one. While it pushes, it drives arcs no tighter
-than those on which a box that lies flat against the front sticks to it (``_RADIUS``). The box may
-lie off the middle of the front, so that a robot beside a wall can push a box along that wall. For
+than those on which a box that lies flat against the middle of the front sticks to it (``_RADIUS``).
+The box may lie off the middle, so that a robot beside a wall can push a box along that wall. For
 each of three such places (``_ASIDE``), the costs of the cheapest ways to the receptacle are
-computed once for all poses of a room, as robot and box together keep off walls and columns.
+computed once for all poses of a lattice. On these ways robot and box keep off walls and columns, at
+the poses of the lattice; between them, they may come nearer by a few centimetres.
 
 The next box is the one for which the way of the robot behind it, by arcs ahead and back and by
-turns on the spot, and the push cost least together. Places near boxes cost more on the way, but are
-not forbidden. Other boxes do not count during a push: the robot takes them along or moves them
-aside, and what has become of them is seen before the next one.
+turns on the spot, and the push cost least together. Places near boxes, this one too, cost more on
+the way, but are not forbidden. Other boxes do not count during a push: the robot takes them along
+or moves them aside, and what has become of them is seen before the next one.
 """
 
 import math
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -30,7 +31,8 @@ from push_planner.pose_lattice import Mask, Numbers, PoseLattice, costs_to, join
 _RADIUS = 1.0
 """[m] of the tightest arc. Of a box of 0.44 m in front of the robot of Bench-Push, the resultant of
 the contact then acts 0.18 m from the middle of the box's side, of which 0.22 m are half; and the
-force is turned by 32 degrees, of which a friction of 1 allows 45."""
+force is turned by 32 degrees, of which a friction of 1 allows 45. A box that lies 0.19 m towards
+the inside of the bend may slip on it. The boxes there do not slide on."""
 _ASIDE = (-0.12, 0.0, 0.12)  # [m] of the box from the middle of the front
 _NEAR_ASIDE = 0.07  # [m] by which it may lie elsewhere
 _PUSHED_TIGHT, _DRIVEN_TIGHT = 0.5, 0.05  # see PoseLattice.arcs
@@ -39,7 +41,7 @@ _GAP = (0.02, 0.2)  # [m] between front and box where a push begins
 _TURNED = 3.0  # [m/rad] of way that an angle between front and side of the box is worth
 _STRAIGHT = 0.15  # [rad] by which a straight push may begin off its course
 _MARGIN = 0.015  # [m] that the robot keeps from what is fixed
-_DEAR = 6.0  # what a metre costs beyond one where the robot would touch a box
+_DEAR = 6.0  # what a metre costs more for each half of the robot that would touch a box
 _SPACING = 0.05  # [m] of points on outlines
 _CELL = 0.02  # [m] of the map
 
@@ -90,7 +92,7 @@ class BoxDelivery:
         self._room = room
         polygons = tuple(PolygonSpec(tuple((x, y) for x, y in o.tolist())) for o in room.fixed)
         width, height = (2.0 * room.limits).tolist()
-        field = DistanceField(
+        field = self._field = DistanceField(
             rasterise(EnvironmentSpec((width, height), polygons=polygons, resolution=_CELL))
         )
         lattice = self._lattice = PoseLattice(room.limits, _RADIUS)
@@ -100,15 +102,18 @@ class BoxDelivery:
         away = np.array([field.at(x, y) for x, y in lattice.poses[:, :2]])
         drives = [lattice.arcs(self._free, sign, _DRIVEN_TIGHT) for sign in (1.0, -1.0)]
         self._edges = joined([*drives, lattice.turns(away >= reach + _MARGIN, _TURN)])
-        self._pushes = [self._to_receptacle(field, aside) for aside in _ASIDE]
 
-    def _to_receptacle(self, field: DistanceField, aside: float) -> tuple[Array, Numbers]:
+    @cached_property
+    def _pushes(self) -> list[tuple[Array, Numbers]]:
+        return [self._to_receptacle(aside) for aside in _ASIDE]
+
+    def _to_receptacle(self, aside: float) -> tuple[Array, Numbers]:
         """Costs [m] to push a box there from each pose, and the next pose; see ``costs_to``."""
         room, lattice = self._room, self._lattice
         grown = _square(room.box + 2.0 * room.grown)
         middle = np.array([room.front + room.grown + 0.5 * room.box, aside])
         body = densified(grown + middle, _SPACING)
-        free = self._free & (field.clearances(body, lattice.poses) > 0.0)
+        free = self._free & (self._field.clearances(body, lattice.poses) > 0.0)
         goals = free.copy()
         for corner in _square(room.box) + middle:
             c, s = lattice.axes.T

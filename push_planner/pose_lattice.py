@@ -65,18 +65,22 @@ class PoseLattice:
         found = []
         for bend in _BENDS:
             turn, length = bend * _TURN, _TURN * self._radius
-            half = 0.5 * turn
-            chord = sign * length * (math.sin(half) / half if turn else 1.0)
-            course = self.poses[:, 2] + sign * half
-            ends = self.poses + np.column_stack(
-                [chord * np.cos(course), chord * np.sin(course), np.full(len(course), sign * turn)]
-            )
+            ends = self._driven(sign * length, sign * turn)
             to = self.nearest(ends)
             begins = np.flatnonzero(free & (to >= 0))
             begins = begins[free[to[begins]]]
             more = tight * {0.0: 0.0, 0.5: 0.1, 1.0: 1.0}[abs(bend)]
             found.append((begins, to[begins], np.full(len(begins), length * (1.0 + more))))
         return joined(found)
+
+    def _driven(self, length: float, turn: float) -> Array:
+        """``(n, 3)`` ends of arcs of this length [m], which turn so far [rad], from all poses."""
+        half = 0.5 * turn
+        chord = length * (math.sin(half) / half if turn else 1.0)
+        course = self.poses[:, 2] + half
+        way = chord * np.column_stack([np.cos(course), np.sin(course)])
+        ends: Array = self.poses + np.column_stack([way, np.full(len(way), turn)])
+        return ends
 
     def turns(self, where: Mask, cost: float) -> Edges:
         """Turns on the spot from a heading to the next one, where there is room ``(n,)``; each
@@ -99,7 +103,7 @@ def joined(edges: Sequence[Edges]) -> Edges:
 def least_costs(edges: Edges, count: int, start: int) -> tuple[Array, Numbers]:
     """Cost [m] of the cheapest way from a node to each one, ``(count,)``, infinite where there is
     none; and the node before each on that way, negative where there is none."""
-    begins, to, costs = edges
+    begins, to, costs = edges  # no edge twice: their costs would be added
     graph = csr_matrix((costs, (begins, to)), shape=(count, count))
     cost, before = dijkstra(graph, indices=start, return_predecessors=True)
     return cost, before.astype(np.int64)

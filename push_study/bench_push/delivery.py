@@ -1,7 +1,7 @@
 """Ways to deliver boxes: the planner of this project, and straight pushes for comparison.
 
 Both see the pose of the robot, rounded by benchnpin to 1 cm and 0.01 rad, and the outlines of the
-boxes that are not yet delivered, and are told the walls, the columns and the divider.
+boxes that are not yet delivered, and are told what is fixed: columns, divider, pieces in corners.
 """
 
 import math
@@ -18,7 +18,7 @@ _MOST = 300  # plans of an episode
 _MOVED = 0.15  # [m] of a box, on the robot's way to it, after which there is a new plan
 _STANDS = 0.05  # [m] that a box moves at most in a push that is not tried again
 _AHEAD = 0.3  # [m] of the point that the robot steers at
-_TIGHTEST = 1.15, 1.3  # [1/m] of what it steers, with a box and without
+_TIGHTEST = 1.0, 1.3  # [1/m] of what it steers, with a box and without
 _FLAT = 0.08  # [m] from the front within which a box counts as flat against it
 _EASED = 0.3  # of the curvature that is steered until then
 _SLOW = 0.2  # [m] before the end of a way within which the robot slows down
@@ -110,7 +110,7 @@ class _Pusher(Robot):
         if middle is None:
             return False
         ahead, aside = self._seen_from(seen, middle)
-        return bool(ahead < self._touching + _HELD[0] and abs(aside) < _HELD[1])
+        return bool(0.0 < ahead < self._touching + _HELD[0] and abs(aside) < _HELD[1])
 
     def _seen_from(self, seen: Seen, point: Array) -> Array:
         """``(2,)`` [m] of a point in the frame of the robot."""
@@ -140,7 +140,7 @@ class _Pusher(Robot):
             seen = yield from self.act(sign * speed, speed * curvature)
             left = float(np.hypot(*(points[-1] - seen["pose"][:2]))) + 0.4 * (last - aim)
             idle = 0 if left < least - 0.01 else idle + 1
-            least = min(least, left) if idle else left
+            least = least if idle else left
             if idle > _IDLE:
                 raise Blocked(seen)
         return seen

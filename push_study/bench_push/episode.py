@@ -15,12 +15,11 @@ from push_study.statistics import mean_interval, wilson
 from push_study.study import StudyOptions
 
 MEASURES = ("share", "efficiency", "effort", "path_m", "time_s")
-"""All but time_s of benchnpin. share: of the boxes that are where they belong at the end.
-efficiency: length of a spanning tree of robot, goals and these boxes (where they were at first),
-over the robot's path. effort: (R + S) / (R + W), of sums of mass times way: R of the robot, S of
-the shortest ways of these boxes, W of all boxes. path_m: of the robot. time_s: [s] of
-simulation."""
-_ACTION = 0.2  # [s]
+"""Of benchnpin, but time_s, and W in box delivery (``worker.Delivery.step``). share: of the boxes
+that are where they belong at the end. efficiency: length of a spanning tree of robot, goals and
+these boxes (where they were at first), over the robot's path. effort: (R + S) / (R + W), of sums of
+mass times way: R of the robot, S of the shortest ways of these boxes, W of all boxes. path_m: of
+the robot. time_s: [s] of simulation."""
 _THROWN = 1.0  # [m] that a box moves in one action, which no robot can make it do
 
 
@@ -30,7 +29,6 @@ class Episode:
 
     scenario: str
     seed: int
-    out: str
 
 
 def episodes(options: StudyOptions, known: Sequence[str]) -> list[Episode]:
@@ -39,19 +37,17 @@ def episodes(options: StudyOptions, known: Sequence[str]) -> list[Episode]:
         if name not in known:
             raise SettingsError(f"no scenario called '{name}'; expected one of: {', '.join(known)}")
     return [
-        Episode(name, options.seed + k, str(options.out))
-        for k in range(options.trials)
-        for name in options.scenarios
+        Episode(name, options.seed + k) for k in range(options.trials) for name in options.scenarios
     ]
 
 
-def run(episode: Episode, room_name: str, policy_in: Callable[[Seen], Policy]) -> Row:
+def run(episode: Episode, room: Room, policy_in: Callable[[Seen], Policy]) -> Row:
     """One episode. A policy that has no more to do lets the robot stand until the end.
 
-    room_name: of benchnpin. policy_in: makes the policy of what the room tells after a reset.
+    policy_in: makes the policy of what the room tells after a reset.
     """
-    spent, steps, thrown = 0.0, 0, 0.0
-    with Room(room_name) as room:
+    spent, thrown = 0.0, 0.0
+    with room:
         seen = room.reset(episode.seed)
         count, over = len(seen["boxes"]), False
         began = time.thread_time()
@@ -61,7 +57,7 @@ def run(episode: Episode, room_name: str, policy_in: Callable[[Seen], Policy]) -
         while not over:
             before = seen
             seen = room.step(*(action or (0.0, 0.0)))
-            steps, over = steps + 1, seen["over"]
+            over = seen["over"]
             thrown = max(thrown, _moved(before, seen))
             began = time.thread_time()
             if action is not None and not over:
@@ -74,7 +70,6 @@ def run(episode: Episode, room_name: str, policy_in: Callable[[Seen], Policy]) -
     reason = f"{left} of {count} boxes are left" if left else ""
     if thrown > _THROWN:
         reason = f"the physics threw a box by {thrown:.1f} m in one action"
-    seen["time_s"] = _ACTION * steps
     return {
         "scenario": episode.scenario,
         "seed": episode.seed,

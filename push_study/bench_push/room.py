@@ -32,10 +32,11 @@ def python() -> Path:
 
 
 class Room:
-    """name: of a room of benchnpin, e.g. ``clear_env``. A context: the process ends with it."""
+    """A context: the process ends with it."""
 
-    def __init__(self, name: str) -> None:
-        self._name = name
+    def __init__(self, task: str, name: str) -> None:
+        """task: of ``worker.TASKS``. name: of a room of benchnpin, e.g. ``clear_env``."""
+        self._task, self._name = task, name
         self._log = tempfile.TemporaryFile(mode="w+")  # noqa: SIM115, closed in __exit__
         self._process = subprocess.Popen(
             [str(python()), "-I", str(Path(__file__).with_name("worker.py"))],
@@ -59,7 +60,7 @@ class Room:
 
     def reset(self, seed: int) -> dict[str, Any]:
         """Begin an episode; what ``worker.py`` tells of it."""
-        return self._ask({"reset": seed, "room": self._name})
+        return self._ask({"reset": seed, "task": self._task, "room": self._name})
 
     def step(self, speed: float, turn: float) -> dict[str, Any]:
         """One action of 0.2 s. speed, turn: of the room's greatest speed and turn rate."""

@@ -1,9 +1,9 @@
 """A room of benchnpin for another process: a line of JSON in, a line of JSON out.
 
-Runs with the Python of another environment, without this project. Physics and measures of the room
-are not changed. Its observations as images and the rewards of box delivery are left out, for they
-would take most of the time, and its actions are velocities. Asked for ``reset``, it tells the room
-and where everything is; asked for ``step``, where everything is then, and the measures of benchnpin
+Runs with the Python of another environment, without this project. The physics of the room is not
+changed. Its observations as images and the rewards of box delivery are left out, for they would
+take most of the time, and its actions are velocities. Asked for ``reset``, it tells the room and
+where everything is; asked for ``step``, where everything is then, and the measures of benchnpin
 once the episode is over.
 """
 
@@ -15,11 +15,11 @@ import sys
 import warnings
 from typing import Any
 
+ACTION = 0.2
+"""[s] of an action, but of one in which a robot touches a wall in box delivery: it ends then."""
 LIMIT = 2000
 """Actions from one box that is cleared or delivered to the next at most, as in the evaluation of
 the policy GTSP in IvanIZ/BenchPush (e9f865b)."""
-DELIVERY = ("small_empty", "small_columns", "large_columns", "large_divider")
-"""Rooms of box delivery; the others are of area clearing."""
 
 
 def main() -> None:
@@ -35,22 +35,23 @@ def main() -> None:
     for line in sys.stdin:
         ask = json.loads(line)
         if "reset" in ask:
-            kind = Delivery if ask["room"] in DELIVERY else Clearing
-            task = kind(ask["room"], ask["reset"])
-            _, info = task.env.reset()
+            task = TASKS[ask["task"]](ask["room"], ask["reset"])
+            info = task.reset()
             metric = TaskDrivenMetric("", task.env.cfg.agent.mass)
             metric.reset(info)
             tell = task.room(info)
         else:
-            _, reward, terminated, truncated, info = task.env.step(task.action(*ask["step"]))
-            over = terminated or truncated
+            reward, over, info = task.step(*ask["step"])
             metric.update(info=info, reward=reward, eps_complete=over)
             tell = {"done": task.done(info), "over": over}
             if over:
                 tell["share"] = metric.success_rates[-1]
-                tell["efficiency"] = metric.efficiency_scores[-1]
+                tell["efficiency"] = (
+                    metric.efficiency_scores[-1] if metric.total_robot_dist else 0.0
+                )
                 tell["effort"] = metric.effort_scores[-1]
                 tell["path_m"] = metric.total_robot_dist
+                tell["time_s"] = task.time
         tell["pose"] = info["state"]
         tell |= task.boxes(info)
         answers.write(json.dumps(tell, default=_plain) + "\n")
@@ -68,10 +69,18 @@ class Clearing:
         agent, sim = {"action_type": "velocity"}, {"t_max": LIMIT}
         room = {"env": name, "low_dim_state": True, "render": {"show": False}}
         self.env = AreaClearingEnv({**room, "agent": agent, "sim": sim})
+        self.time = 0.0
 
-    def action(self, speed: float, turn: float) -> tuple[float, float]:
-        """Of the greatest speed and turn rate, as the room takes it."""
-        return speed, turn
+    def reset(self) -> dict[str, Any]:
+        """What the room tells."""
+        return dict(self.env.reset()[1])
+
+    def step(self, speed: float, turn: float) -> tuple[float, bool, dict[str, Any]]:
+        """An action, of the greatest speed and turn rate: reward, whether it was the last one, and
+        what the room tells."""
+        _, reward, terminated, truncated, info = self.env.step((speed, turn))
+        self.time += ACTION
+        return reward, terminated or truncated, info
 
     def done(self, info: dict[str, Any]) -> int:
         """Boxes that are out."""
@@ -117,10 +126,36 @@ class Delivery:
         self.env.generate_observation = lambda done=False: None
         self.env.shortest_path_distance = lambda *_: 0.0  # only rewards use it
 
-    def action(self, speed: float, turn: float) -> tuple[float, float]:
-        """Of the greatest speed and turn rate, as the room takes it: in m/s and rad/s. The room
-        bounds the speed; of the turn rate, the action space says 1 rad/s."""
-        return speed * self.env.target_speed, turn
+        self.time, self._work = 0.0, 0.0
+        self._all: list[Any] = []
+        self._middles: list[Any] = []
+
+    def reset(self) -> dict[str, Any]:
+        """What the room tells. From now on, its time is counted."""
+        _, info = self.env.reset()
+        self._all = sorted(self.env.boxes, key=lambda box: box.idx)
+        self._middles = [box.body.position for box in self._all]
+        step = self.env.space.step
+
+        def counted(time: float) -> None:
+            self.time += time
+            step(time)
+
+        self.env.space.step = counted
+        return dict(info)
+
+    def step(self, speed: float, turn: float) -> tuple[float, bool, dict[str, Any]]:
+        """As above. The room bounds the speed; of the turn rate, its action space says 1 rad/s.
+
+        Its measure of work compares each box with its successor in the list once one is delivered;
+        here it is the sum of area times way of each box.
+        """
+        action = speed * self.env.target_speed, turn
+        _, reward, terminated, truncated, info = self.env.step(action)
+        middles = [box.body.position for box in self._all]
+        ways = [a.get_distance(b) for a, b in zip(self._middles, middles, strict=True)]
+        self._middles, self._work = middles, self._work + self.env.cfg.boxes.box_size**2 * sum(ways)
+        return reward, terminated or truncated, {**info, "total_work": self._work}
 
     def done(self, info: dict[str, Any]) -> int:
         """Boxes that are delivered."""
@@ -146,7 +181,7 @@ class Delivery:
             "limits": [0.5 * env.room_length, 0.5 * env.room_width],
             "fixed": fixed,
             "receptacle": [[x + a, y + b] for a, b in corners],
-            "robot": [list(v) for v in env.robot.get_vertices()],
+            "robot": _hull(env.robot.body.shapes),
             "box": env.cfg.boxes.box_size,
             "grown": env.boxes[0].radius,
             "speed": env.target_speed,
@@ -159,6 +194,14 @@ def _grown(outline: Any, radius: float) -> list[Any]:
     from shapely import Polygon
 
     return list(Polygon(outline).buffer(radius, join_style=2).exterior.coords)[:-1]
+
+
+def _hull(shapes: Any) -> list[Any]:
+    """Outline about the shapes of a body, in its frame."""
+    from shapely import Polygon, union_all
+
+    parts = [Polygon(s.get_vertices()).buffer(s.radius, join_style=2) for s in shapes]
+    return list(union_all(parts).convex_hull.exterior.coords)[:-1]
 
 
 def _pushes(box: Any, lines: Any, area: Any) -> list[list[list[float]]]:
@@ -189,6 +232,8 @@ def _plain(value: Any) -> Any:
     """Arrays and numbers of numpy."""
     return value.tolist()
 
+
+TASKS = {"clearing": Clearing, "delivery": Delivery}
 
 if __name__ == "__main__":
     main()

@@ -18,7 +18,7 @@ from push_study.bench_push.episode import (
     statistics,
 )
 from push_study.bench_push.policies import gtsp, gtsp_again, sweeping
-from push_study.bench_push.room import python
+from push_study.bench_push.room import Room, python
 from push_study.pool import Row
 from push_study.study import StudyOptions
 
@@ -44,7 +44,7 @@ def tasks(options: StudyOptions) -> list[Episode]:
 def trial(task: Episode) -> Row:
     """One episode."""
     name, policy = task.scenario.split("-", 1)
-    return run(task, ROOMS[name], POLICIES[policy])
+    return run(task, Room("clearing", ROOMS[name]), POLICIES[policy])
 
 
 def conclude(options: StudyOptions, tasks: Sequence[Any], rows: list[Row]) -> None:

@@ -19,7 +19,7 @@ from push_study.bench_push.episode import (
     scenarios,
     statistics,
 )
-from push_study.bench_push.room import python
+from push_study.bench_push.room import Room, python
 from push_study.pool import Row
 from push_study.study import StudyOptions
 
@@ -50,7 +50,7 @@ def tasks(options: StudyOptions) -> list[Episode]:
 def trial(task: Episode) -> Row:
     """One episode."""
     name, policy = task.scenario.split("-")
-    return run(task, ROOMS[name], POLICIES[policy])
+    return run(task, Room("delivery", ROOMS[name]), POLICIES[policy])
 
 
 def conclude(options: StudyOptions, tasks: Sequence[Any], rows: list[Row]) -> None:

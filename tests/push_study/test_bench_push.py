@@ -38,7 +38,7 @@ def test_an_unknown_scenario_is_refused(tmp_path):
 def test_a_room_that_does_not_start_says_why(tmp_path, monkeypatch):
     """A Python without benchnpin."""
     monkeypatch.setenv(room.PYTHON, sys.executable)
-    with room.Room("clear_env") as made, pytest.raises(RuntimeError, match="benchnpin"):
+    with room.Room("clearing", "clear_env") as made, pytest.raises(RuntimeError, match="benchnpin"):
         made.reset(1)
 
 
@@ -236,8 +236,8 @@ def test_gtsp_again_plans_further_tours_while_boxes_are_in_the_area():
 class MadeUp:
     """In the place of a room of benchnpin: two boxes, of which one leaves at once."""
 
-    def __init__(self, name):
-        assert name in bench_push.ROOMS.values()
+    def __init__(self, task, name):
+        assert task == "clearing" and name in bench_push.ROOMS.values()
         self.step_of_boxes, self.steps = 0.3, 0
 
     def __enter__(self):
@@ -250,7 +250,7 @@ class MadeUp:
         boxes = [SQUARE + [5.0 + self.step_of_boxes * self.steps, 0.0], SQUARE]
         more = {"done": 1, "over": self.steps == 4, "share": 0.5, "efficiency": 0.4}
         room = told(np.zeros(3), boxes, [pushed(b) for b in boxes])
-        return room | more | {"effort": 0.3, "path_m": 2.0}
+        return room | more | {"effort": 0.3, "path_m": 2.0, "time_s": 0.8}
 
     def reset(self, seed):
         return self.seen()
@@ -261,19 +261,19 @@ class MadeUp:
 
 
 class Throwing(MadeUp):
-    def __init__(self, name):
-        super().__init__(name)
+    def __init__(self, task, name):
+        super().__init__(task, name)
         self.step_of_boxes = 1.5
 
 
 @pytest.mark.parametrize("scenario", bench_push.SCENARIOS)
 def test_an_episode_in_which_a_box_is_thrown_does_not_count(monkeypatch, scenario):
-    monkeypatch.setattr(episode, "Room", MadeUp)
-    row = bench_push.trial(episode.Episode(scenario, 1, ""))
+    monkeypatch.setattr(bench_push, "Room", MadeUp)
+    row = bench_push.trial(episode.Episode(scenario, 1))
     assert not row["success"] and row["reason"] == "1 of 2 boxes are left"
     assert row["time_s"] == pytest.approx(0.8) and row["share"] == 0.5
-    monkeypatch.setattr(episode, "Room", Throwing)
-    row = bench_push.trial(episode.Episode(scenario, 1, ""))
+    monkeypatch.setattr(bench_push, "Room", Throwing)
+    row = bench_push.trial(episode.Episode(scenario, 1))
     assert not row["success"] and "threw a box by 1.5 m" in row["reason"]
 
 
@@ -291,7 +291,7 @@ def test_a_crashed_episode_counts_as_one_that_is_not_cleared(tmp_path, capsys):
 @pytest.mark.long
 @pytest.mark.skipif(not installed(), reason="the environment of benchnpin is not installed")
 def test_the_open_room_is_cleared_and_equal_seeds_give_equal_rows():
-    tasks = [episode.Episode("clear-sweeps", seed, "") for seed in (1, 2, 3)]
+    tasks = [episode.Episode("clear-sweeps", seed) for seed in (1, 2, 3)]
     rows = [bench_push.trial(task) for task in tasks]
     assert all(row["success"] and row["efficiency"] > 0.6 for row in rows)
     again = bench_push.trial(tasks[1])

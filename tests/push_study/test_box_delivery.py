@@ -87,22 +87,54 @@ def test_the_robot_delivers_a_box_within_the_action_space_and_ends(seed):
     assert np.abs(made.actions).max() <= 1.0
 
 
-def test_a_robot_that_does_not_move_backs_off_and_tries_another_push():
+def test_a_robot_that_does_not_move_backs_off_and_tries_another_push(monkeypatch):
     """Whatever it is told to do, it stands: no command is repeated for longer than it takes to give
     one up and to undo another."""
+    planned, pushes = delivery.BoxDelivery.next_push, []
+
+    def next_push(planner, *given):
+        pushes.append(planned(planner, *given))
+        return pushes[-1]
+
+    monkeypatch.setattr(delivery.BoxDelivery, "next_push", next_push)
     made = FakeRoom([0.5, 0.0, 0.3], PLACES, stands=True)
     policy = delivery.delivering(made.told())
     actions = [next(policy)]
     actions += [policy.send(made.step(actions[-1])) for _ in range(300)]
     changes = np.flatnonzero(np.any(np.diff(actions, axis=0) != 0.0, axis=1)) + 1
     assert np.diff([0, *changes, 301]).max() <= 15 + 8
+    chosen = [(push.box, push.node) for push in pushes]
+    assert len(chosen) > 5 and len(set(chosen)) == len(chosen)
+
+
+@pytest.mark.parametrize(("by", "plans"), [(0.1, 1), (0.4, 2)])
+def test_a_box_that_moves_before_it_is_pushed_is_planned_for_anew(by, plans, monkeypatch):
+    planned, pushes = delivery.BoxDelivery.next_push, []
+
+    def next_push(planner, *given):
+        pushes.append(planned(planner, *given))
+        return pushes[-1]
+
+    monkeypatch.setattr(delivery.BoxDelivery, "next_push", next_push)
+    made = FakeRoom([1.0, 0.0, 0.3], [np.array([-1.0, 0.5, 0.0])])
+    policy = delivery.delivering(made.told())
+    action = next(policy)
+    for k in range(2000):
+        before = made.places[0].copy()
+        made.step(action)
+        if (made.places[0] != before).any():
+            break
+        if k == 2:
+            made.places[0][1] -= by
+        action = policy.send(made.told())
+    assert k < 1999 and len(pushes) == plans  # when the robot touches it
 
 
 def test_a_box_that_slips_off_is_pushed_anew():
-    """It is put beside the front in the middle of a push: the robot does not push on without it."""
+    """It is put beside the front in the middle of a push: the robot stops, and goes behind it."""
     made = FakeRoom([-2.0, 0.5, 0.0], [np.array([-1.0, 0.5, 0.0])])
     policy = delivery.delivering(made.told())
-    action, slipped = next(policy), None
+    action, slipped, stops = next(policy), None, False
     for k in range(2000):
         seen = made.step(action)
         if slipped is None and made.places and made.places[0][0] > 0.0:
@@ -113,9 +145,9 @@ def test_a_box_that_slips_off_is_pushed_anew():
             action = policy.send(seen)
         except StopIteration:
             break
-        if slipped is not None and k == slipped + 1:
-            assert action != (1.0, 0.0) or not made.places
-    assert slipped is not None and not made.places and k < 1999
+        if slipped is not None and k <= slipped + 3:
+            stops = stops or action[0] <= 0.0
+    assert slipped is not None and stops and not made.places and k < 1999
 
 
 def test_without_its_environment_the_study_says_what_to_do(tmp_path, monkeypatch, capsys):
@@ -134,8 +166,8 @@ class MadeUp(FakeRoom):
     """In the place of a room of benchnpin; the episode ends after 600 actions, or when no box is
     left."""
 
-    def __init__(self, name):
-        assert name in box_delivery.ROOMS.values()
+    def __init__(self, task, name):
+        assert task == "delivery" and name in box_delivery.ROOMS.values()
         super().__init__([0.5, 0.0, 0.3], PLACES)
 
     def __enter__(self):
@@ -147,7 +179,8 @@ class MadeUp(FakeRoom):
     def told(self):
         over = len(self.actions) == 600 or not self.places
         more = {"done": self.count - len(self.places), "over": over, "share": 0.7, "effort": 0.9}
-        return super().told() | more | {"efficiency": 0.6, "path_m": 2.0}
+        time_s = 0.2 * len(self.actions)
+        return super().told() | more | {"efficiency": 0.6, "path_m": 2.0, "time_s": time_s}
 
     def reset(self, seed):
         return self.told()
@@ -158,16 +191,17 @@ class MadeUp(FakeRoom):
 
 @pytest.mark.parametrize("scenario", box_delivery.SCENARIOS)
 def test_an_episode_has_the_measures_of_the_room(monkeypatch, scenario):
-    monkeypatch.setattr(episode, "Room", MadeUp)
-    row = box_delivery.trial(episode.Episode(scenario, 1, ""))
-    assert row["success"] == (not row["reason"]) and 0.0 < row["time_s"] <= 120.0
+    monkeypatch.setattr(box_delivery, "Room", MadeUp)
+    row = box_delivery.trial(episode.Episode(scenario, 1))
+    delivered = row["time_s"] < 119.0  # else the episode ended with boxes left
+    assert row["success"] == delivered and row["reason"].endswith("are left") != delivered
     assert row["share"] == 0.7 and row["efficiency"] == 0.6 and row["path_m"] == 2.0
 
 
 @pytest.mark.long
 @pytest.mark.skipif(not installed(), reason="the environment of benchnpin is not installed")
 def test_all_boxes_are_delivered_and_equal_seeds_give_equal_rows():
-    tasks = [episode.Episode("small-pushes", seed, "") for seed in (1, 2, 3)]
+    tasks = [episode.Episode("small-pushes", seed) for seed in (1, 2, 3)]
     rows = [box_delivery.trial(task) for task in tasks]
     assert all(row["success"] and row["efficiency"] > 0.5 for row in rows)
     again = box_delivery.trial(tasks[1])
