@@ -6,7 +6,7 @@ from shapely import LinearRing, MultiPoint, Point, Polygon
 
 from push_estimation.outline_estimate import OutlineEstimate
 from push_estimation.outline_learner import OutlineLearner
-from tests.samples import mostly_long
+from tests.samples import mostly_long, slice_and_study
 
 R = 0.037  # [m]
 NOISE = 1e-3  # [m] of one frame
@@ -61,8 +61,7 @@ def error(outline, truth):
     return LinearRing(outline).hausdorff_distance(LinearRing(truth.exterior.coords))
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("seeds", [range(20), range(20, 80)])
+@pytest.mark.parametrize("seeds", slice_and_study([range(20), range(20, 80)], 1))
 @pytest.mark.parametrize("first", ["disc", "-20 %", "+20 %"])
 def test_all_round_any_object_the_outline_is_found(first, seeds):
     """80 objects. The worst errors are at tips sharper than 60 degrees, whose flanks robots feel

@@ -19,6 +19,7 @@ from push_planner.cost_bound import CostBound
 from push_planner.dubins_bound import least_length
 from push_planner.run_ends import RunEnds
 from push_planner.single_run import least_single_run
+from tests.samples import slice_and_study
 
 
 class Dubins:
@@ -282,7 +283,7 @@ def test_a_wall_across_the_way_raises_the_bound_of_one_run(robot, box):
     assert aside > 1.25 * free and shut == 60.0
 
 
-@pytest.mark.parametrize("count", [100, pytest.param(2000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("count", [100, pytest.param(2000, marks=pytest.mark.study)])
 def test_boxes_in_which_something_can_stand_are_not_left_out(robot, box, count):
     """Against poses in them at which the side could be changed."""
     random, asked, finite = np.random.default_rng(7), 0, 0
@@ -337,14 +338,14 @@ def test_a_side_may_be_left_where_only_the_farther_place_behind_it_has_room(robo
     assert found > 0
 
 
-@pytest.mark.long
-def test_no_search_finds_a_cheaper_plan(scenario, robot, box):
+@pytest.mark.parametrize(("rooms", "count"), slice_and_study([(1, 2), (2, 4)], 1))
+def test_no_search_finds_a_cheaper_plan(scenario, robot, box, rooms, count):
     """Final plans and an exhaustive search, in environment 1 and among clutter."""
     gaps = []
-    worlds = [scenario.grid, *(rasterise(cluttered(k)) for k in range(2))]
+    worlds = [scenario.grid, *(rasterise(cluttered(k)) for k in range(rooms))]
     for world in worlds:
         planner = PushPlanner(PlannerSettings(), world, robot, box)
-        for start, goal in problems(planner, 4, 11):
+        for start, goal in problems(planner, count, 11):
             try:
                 plan = planner.solve(start, goal)
             except PlanningFailed:
@@ -356,4 +357,4 @@ def test_no_search_finds_a_cheaper_plan(scenario, robot, box):
             assert bound.value <= exhaustive(planner, start, goal, 1) + 1e-9
             assert planner.lower_bound(start, goal) <= plan.cost_bound <= plan.cost
             gaps.append(plan.cost / plan.cost_bound - 1.0)
-    assert len(gaps) > 6 and np.median(gaps) < 0.2
+    assert len(gaps) > 0.5 * count * len(worlds) and np.median(gaps) < 0.2

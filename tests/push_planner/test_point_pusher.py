@@ -10,6 +10,7 @@ from push_model.settings import SettingsError
 from push_planner.point_pusher import PointPusher, PointPushSettings, PointTask
 from push_study.experiments import pusht
 from push_study.experiments.pusht import CENTRE, DISC, GYRATION, SCALE, T
+from tests.samples import slice_and_study
 
 OUTLINE, ROOM = T - CENTRE, (0.001, 0.511)
 GOAL = np.array([0.256, 0.256, 1.0])
@@ -42,16 +43,15 @@ def test_the_t_is_brought_to_its_place_also_where_the_model_is_wrong(gyration):
     assert reach(1, gyration) < 200
 
 
-@pytest.mark.long
-def test_it_is_brought_there_from_anywhere():
-    """20 random starts, with radii of gyration up to 20 % from what is believed."""
+@pytest.mark.parametrize("count", slice_and_study([7, 20], 1))
+def test_it_is_brought_there_from_anywhere(count):
+    """Random starts, with radii of gyration up to 20 % from what is believed."""
     random = np.random.default_rng(7)
-    frames = [reach(s, GYRATION * random.uniform(0.8, 1.2)) for s in range(20)]
-    assert sum(f < 200 for f in frames) >= 19 and np.median(frames) < 100
+    frames = [reach(s, GYRATION * random.uniform(0.8, 1.2)) for s in range(count)]
+    assert sum(f < 200 for f in frames) >= count - 1 and np.median(frames) < 100
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("count", [2, 40])
+@pytest.mark.parametrize("count", slice_and_study([10, 40], 1))
 def test_the_disc_reaches_its_pushes_without_touching_the_object(count):
     """Random plans, carried out until the push begins: on the way nothing is touched."""
     random, item, begun = np.random.default_rng(3), body(OUTLINE, GYRATION), 0
@@ -107,13 +107,14 @@ def test_the_physics_of_pusht_are_those_of_the_model():
     assert env.space.collision_slop * SCALE == pytest.approx(DISC.slop)
 
 
-@pytest.mark.long
-def test_pusht_is_solved():
-    """A slice of ``experiment pusht``: 20 seeds of gym-pusht's own environment."""
+@pytest.mark.parametrize(("count", "strictly"), slice_and_study([(6, 3), (20, 8)], 1))
+def test_pusht_is_solved(count, strictly):
+    """A slice of ``experiment pusht``, in gym-pusht's own environment."""
     pytest.importorskip("gym_pusht")
-    rows = [pusht.trial(pusht.PushTTask("pusht", seed, "")) for seed in range(2000, 2020)]
-    assert sum(r["success"] for r in rows) >= 19
-    strict = [pusht.trial(pusht.PushTTask("pusht-iou", seed, "")) for seed in range(2000, 2008)]
-    assert sum(r["success"] for r in strict) >= 7
+    seeds = range(2000, 2000 + count)
+    rows = [pusht.trial(pusht.PushTTask("pusht", seed, "")) for seed in seeds]
+    assert sum(r["success"] for r in rows) >= count - 1
+    strict = [pusht.trial(pusht.PushTTask("pusht-iou", s, "")) for s in seeds[:strictly]]
+    assert sum(r["success"] for r in strict) >= strictly - 1
     again = pusht.trial(pusht.PushTTask("pusht", 2000, ""))
     assert all(again[k] == rows[0][k] for k in ("steps", "best_coverage", "success"))

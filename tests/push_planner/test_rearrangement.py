@@ -15,6 +15,7 @@ from push_planner.push_plan import PlanError, PlanningFailed
 from push_planner.rearrangement import Rearrangement, RearrangementSettings
 from push_scenario.scenario import load_scenario
 from push_study.relopush import SCENES, scenario_of
+from tests.samples import slice_and_study
 
 
 def planned(search, poses, goals, robot=None):
@@ -69,11 +70,11 @@ def test_the_scenes_of_relopush_are_solved(name):
     assert (aside > 0) == (name == "relopush-6")  # the one in which two boxes change places
 
 
-@pytest.mark.long
+@pytest.mark.parametrize("count", slice_and_study([8, 30], 1))
 @pytest.mark.parametrize("name", [*SCENES, "random-4", "random-8", "shuffle-2", "shuffle-4"])
-def test_hundreds_of_scenes_are_solved(name):
+def test_hundreds_of_scenes_are_solved(name, count):
     solved = 0
-    for seed in range(200, 230):
+    for seed in range(200, 200 + count):
         scenario = scenario_of(name, seed)
         try:
             _, moves = solve(scenario)
@@ -81,7 +82,7 @@ def test_hundreds_of_scenes_are_solved(name):
             continue
         check(scenario, moves)
         solved += 1
-    assert solved == 30
+    assert solved == count
 
 
 @pytest.mark.long

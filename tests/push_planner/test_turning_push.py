@@ -11,6 +11,7 @@ from push_model.outlines import overlap
 from push_planner import PlannerSettings, PlanningFailed, PushPlanner
 from push_planner.preemptive import plan_after_preemptive_push
 from push_planner.turning_push import turning_search
+from tests.samples import slice_and_study
 
 STUCK = np.array([-0.572, 0.893, -0.54])  # 45 mm from the wall, its sides at about 30 degrees
 GOAL = np.array([0.768, 0.306, 1.147])
@@ -119,11 +120,11 @@ def test_the_robot_must_have_a_way_to_the_corner(scenario, robot, box):
     assert not finish(turning_search(scene, STUCK, np.array([*at, 0.0]), 6))
 
 
-@pytest.mark.long
-def test_of_random_problems_in_environment_1_at_least_95_in_100_are_solved(planner):
-    """100 problems that were used for nothing else; 86 to 95 have a plan without turning."""
+@pytest.mark.parametrize("count", slice_and_study([40, 100], 1))
+def test_of_random_problems_in_environment_1_at_least_95_in_100_are_solved(planner, count):
+    """Problems that were used for nothing else; 86 to 95 of 100 have a plan without turning."""
     solved = turned = 0
-    for start, goal in problems(planner, 100, 4001):
+    for start, goal in problems(planner, count, 4001):
         try:
             planner.solve(start, goal)
             solved += 1
@@ -134,7 +135,7 @@ def test_of_random_problems_in_environment_1_at_least_95_in_100_are_solved(plann
                 continue
             solved += 1
             turned += plan.segments[0].turns
-    assert solved >= 95 and turned > 0
+    assert solved >= 0.95 * count and turned > 0
 
 
 @pytest.mark.long

@@ -21,6 +21,7 @@ from push_study.rivals.occlusion import Occlusion
 from push_study.study import StudyOptions
 from push_study.swarm.contest import RIVALS, TARGET, RivalTask, run
 from push_study.swarm.figures import draw_figures
+from tests.samples import slice_and_study
 
 SQUARE = load_object("transport_square")
 ARENA = OpenRoom((3.0, 3.0), SQUARE, 0.05, 0.128, np.array(TARGET), 1)
@@ -155,13 +156,13 @@ def test_the_policy_of_the_paper_leads_round_both_walls():
     assert tried == 100
 
 
-@pytest.mark.long
-def test_the_global_input_reaches_the_figure_of_its_authors_in_their_simulation():
+@pytest.mark.parametrize("count", slice_and_study([4, 8], 1))
+def test_the_global_input_reaches_the_figure_of_its_authors_in_their_simulation(count):
     """90 s ± 35 s in ten trials; of their own code, 57 of 60 runs take less than 300 s, with a
     median of 69 s."""
-    rows = [paper.run(seed, 300.0) for seed in range(1, 9)]
+    rows = [paper.run(seed, 300.0) for seed in range(1, count + 1)]
     assert rows[0] == paper.run(1, 300.0)
-    assert sum(r["success"] for r in rows) >= 6
+    assert sum(r["success"] for r in rows) >= 0.75 * count
     assert 45.0 < np.median([r["duration_s"] for r in rows]) < 130.0
 
 

@@ -28,6 +28,7 @@ from swarm_push.own_sensing import METHOD, Guides, _discs
 from swarm_push.robot_sensor import RobotSensor, RobotSensorSettings
 from swarm_push.wall_sides import wall_sides
 from swarm_push.walls import Walls
+from tests.samples import slice_and_study
 
 SQUARE, ROBOT = load_object("transport_square"), load_robot("epuck_ring")
 RADIUS = ROBOT.footprint_radius
@@ -334,8 +335,9 @@ def test_no_robot_is_commanded_into_a_wall():
     assert near > 20
 
 
-@pytest.mark.long
-@pytest.mark.parametrize(("name", "item"), [("middle", "circle"), ("two_corners", "square")])
+@pytest.mark.parametrize(
+    ("name", "item"), slice_and_study([("middle", "circle"), ("two_corners", "square")], 1)
+)
 def test_twenty_robots_bring_an_object_round_walls(name, item):
     name, item = f"transport_{name}", load_object(f"transport_{item}")
     start, goal, places = drawn(name, item, 3, 20, turned=False)

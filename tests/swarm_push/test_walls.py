@@ -17,6 +17,7 @@ from swarm_push.object_track import ObjectTrack, TrackSettings
 from swarm_push.region import covered_region, is_open
 from swarm_push.swarm_job import SwarmJob, SwarmJobSettings
 from swarm_push.walls import Walls
+from tests.samples import slice_and_study
 
 R = 0.05
 NONE = np.zeros((0, 3))
@@ -144,14 +145,16 @@ def test_without_a_way_there_is_no_track_and_the_job_says_so():
     assert "no way" in job.reason
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "item", "turned", "seed"),
-    [
-        ("transport_middle", "l", True, 11),
-        ("transport_corner", "circle", False, 12),
-        ("transport_two_corners", "square", True, 1),
-    ],
+    slice_and_study(
+        [
+            ("transport_middle", "l", True, 11),
+            ("transport_corner", "circle", False, 12),
+            ("transport_two_corners", "square", True, 1),
+        ],
+        2,
+    ),
 )
 def test_objects_come_round_walls(tmp_path, name, item, turned, seed):
     """A slice of the experiment swarm-maps."""
