@@ -51,7 +51,7 @@ test-long: $(STAMP)
 	$(BIN)/python -m pytest -n 3 --dist worksteal -m "long and not live"
 	$(BIN)/python -m pytest -m "long and live"
 
-# Whole samples of claims, e.g. hundreds of random problems: about an hour on two cores.
+# Whole samples of claims, e.g. hundreds of random problems: more than an hour on two cores.
 test-studies: $(STAMP)
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m study
 
