@@ -21,10 +21,10 @@ from functools import cached_property, partial
 import numpy as np
 
 from push_model.arrays import Array
-from push_model.distance_field import DistanceField
+from push_model.distance_field import DistanceField, lookups
 from push_model.occupancy import rasterise
 from push_model.outlines import inside
-from push_model.shapes import densified
+from push_model.shapes import densified, rectangle
 from push_model.specs import EnvironmentSpec, PolygonSpec
 from push_planner.pose_lattice import Mask, Numbers, PoseLattice, costs_to, joined, least_costs
 
@@ -99,7 +99,8 @@ class BoxDelivery:
         outline = densified(room.robot, _SPACING)
         self._free: Mask = field.clearances(outline, lattice.poses) >= _MARGIN
         reach = float(np.hypot(*room.robot.T).max())
-        away = np.array([field.at(x, y) for x, y in lattice.poses[:, :2]])
+        places = np.ascontiguousarray(lattice.poses[:, :2])
+        away = lookups(field.values, places, *field.args)
         drives = [lattice.arcs(self._free, sign, _DRIVEN_TIGHT) for sign in (1.0, -1.0)]
         self._edges = joined([*drives, lattice.turns(away >= reach + _MARGIN, _TURN)])
 
@@ -110,12 +111,12 @@ class BoxDelivery:
     def _to_receptacle(self, aside: float) -> tuple[Array, Numbers]:
         """Costs [m] to push a box there from each pose, and the next pose; see ``costs_to``."""
         room, lattice = self._room, self._lattice
-        grown = _square(room.box + 2.0 * room.grown)
+        side = room.box + 2.0 * room.grown
         middle = np.array([room.front + room.grown + 0.5 * room.box, aside])
-        body = densified(grown + middle, _SPACING)
+        body = densified(rectangle(side, side).outline + middle, _SPACING)
         free = self._free & (self._field.clearances(body, lattice.poses) > 0.0)
         goals = free.copy()
-        for corner in _square(room.box) + middle:
+        for corner in rectangle(room.box, room.box).outline + middle:
             c, s = lattice.axes.T
             x = lattice.poses[:, 0] + c * corner[0] - s * corner[1]
             y = lattice.poses[:, 1] + s * corner[0] + c * corner[1]
@@ -231,8 +232,3 @@ class StraightDelivery(BoxDelivery):
         course = math.atan2(*(end - pose[:2])[::-1])
         out = np.array([math.cos(course), math.sin(course)])
         return np.column_stack([pose[:2] + parts[:, None] * out, np.full(len(parts), course)])
-
-
-def _square(side: float) -> Array:
-    half = 0.5 * side
-    return np.array([[-half, -half], [half, -half], [half, half], [-half, half]])

@@ -18,7 +18,8 @@ from push_study.bench_push.episode import (
     statistics,
 )
 from push_study.bench_push.policies import gtsp, gtsp_again, sweeping
-from push_study.bench_push.room import Room, python
+from push_study.bench_push.room import Room
+from push_study.bench_push.room import python as ready
 from push_study.pool import Row
 from push_study.study import StudyOptions
 
@@ -29,11 +30,6 @@ ROOMS = {"clear": "clear_env", "walled": "walled_env", "columns": "walled_env_wi
 POLICIES = {"sweeps": sweeping, "gtsp": gtsp, "gtsp-again": gtsp_again}
 SCENARIOS = scenarios(ROOMS, POLICIES)
 OPTIONS: dict[str, str] = {}
-
-
-def ready() -> None:
-    """Raises SettingsError where benchnpin has no environment."""
-    python()
 
 
 def tasks(options: StudyOptions) -> list[Episode]:

@@ -3,7 +3,7 @@
 Ten boxes of 0.44 m (twenty in the large rooms) lie in a room of 10 m by 5 m (or 10 m). A robot with
 a flat front 0.7 m wide must push all of them into a receptacle in a corner, where they vanish. An
 episode ends when none is left, or when 2000 actions of 0.2 s have passed since the last one was
-delivered. Share, efficiency and effort are computed by benchnpin.
+delivered. Share and efficiency are computed by benchnpin.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,8 @@ from push_study.bench_push.episode import (
     scenarios,
     statistics,
 )
-from push_study.bench_push.room import Room, python
+from push_study.bench_push.room import Room
+from push_study.bench_push.room import python as ready
 from push_study.pool import Row
 from push_study.study import StudyOptions
 
@@ -35,11 +36,6 @@ ROOMS = {
 POLICIES = {"pushes": delivering, "straight": straight}
 SCENARIOS = scenarios(ROOMS, POLICIES)
 OPTIONS: dict[str, str] = {}
-
-
-def ready() -> None:
-    """Raises SettingsError where benchnpin has no environment."""
-    python()
 
 
 def tasks(options: StudyOptions) -> list[Episode]:

@@ -11,7 +11,7 @@ from planar_push.main import main
 from push_model.outlines import overlap
 from push_model.settings import SettingsError
 from push_study.bench_push import episode, policies, room
-from push_study.experiments import bench_push
+from push_study.experiments import bench_push, box_delivery
 from push_study.study import StudyOptions
 
 
@@ -23,16 +23,18 @@ def installed():
     return True
 
 
-def test_without_its_environment_the_study_says_what_to_do(tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize("study", ["bench-push", "box-delivery"])
+def test_without_its_environment_the_study_says_what_to_do(tmp_path, monkeypatch, capsys, study):
     monkeypatch.setenv(room.PYTHON, str(tmp_path / "nowhere"))
     out = tmp_path / "out"
-    assert main(["experiment", "bench-push", "--trials", "1", "--out", str(out)]) == 2
+    assert main(["experiment", study, "--trials", "1", "--out", str(out)]) == 2
     assert "make benchpush" in " ".join(capsys.readouterr().err.split()) and not out.exists()
 
 
-def test_an_unknown_scenario_is_refused(tmp_path):
+@pytest.mark.parametrize("study", [bench_push, box_delivery])
+def test_an_unknown_scenario_is_refused(tmp_path, study):
     with pytest.raises(SettingsError, match="no scenario called 'clear'"):
-        bench_push.tasks(StudyOptions(("clear",), 1, 1, tmp_path))
+        study.tasks(StudyOptions(("clear",), 1, 1, tmp_path))
 
 
 def test_a_room_that_does_not_start_says_why(tmp_path, monkeypatch):

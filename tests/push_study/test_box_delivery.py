@@ -5,27 +5,17 @@ import math
 import numpy as np
 import pytest
 
-from planar_push.main import main
 from push_model import se2
 from push_model.outlines import inside
-from push_model.settings import SettingsError
-from push_study.bench_push import delivery, episode, room
+from push_study.bench_push import delivery, episode
 from push_study.experiments import box_delivery
-from push_study.study import StudyOptions
+from tests.push_study.test_bench_push import installed
 
 SPEED, TURN, ACTION = 0.3, 1.0, 0.2
 ROBOT = [[-0.42, -0.25], [0.38, -0.35], [0.38, 0.35], [-0.42, 0.25]]
 RECEPTACLE = np.array([[1.5, 0.5], [3.0, 0.5], [3.0, 2.0], [1.5, 2.0]])
 BOX = np.array([[-0.22, -0.22], [0.22, -0.22], [0.22, 0.22], [-0.22, 0.22]])
 TOUCHING = 0.38 + 0.02 + 0.22
-
-
-def installed():
-    try:
-        room.python()
-    except SettingsError:
-        return False
-    return True
 
 
 class FakeRoom:
@@ -148,18 +138,6 @@ def test_a_box_that_slips_off_is_pushed_anew():
         if slipped is not None and k <= slipped + 3:
             stops = stops or action[0] <= 0.0
     assert slipped is not None and stops and not made.places and k < 1999
-
-
-def test_without_its_environment_the_study_says_what_to_do(tmp_path, monkeypatch, capsys):
-    monkeypatch.setenv(room.PYTHON, str(tmp_path / "nowhere"))
-    out = tmp_path / "out"
-    assert main(["experiment", "box-delivery", "--trials", "1", "--out", str(out)]) == 2
-    assert "make benchpush" in " ".join(capsys.readouterr().err.split()) and not out.exists()
-
-
-def test_an_unknown_scenario_is_refused(tmp_path):
-    with pytest.raises(SettingsError, match="no scenario called 'small'"):
-        box_delivery.tasks(StudyOptions(("small",), 1, 1, tmp_path))
 
 
 class MadeUp(FakeRoom):
