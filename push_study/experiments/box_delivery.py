@@ -9,18 +9,12 @@ delivered. Share and efficiency are computed by benchnpin.
 from collections.abc import Sequence
 from typing import Any
 
+from push_study import by_scenario
 from push_study.bench_push.delivery import delivering, straight
-from push_study.bench_push.episode import (
-    MEASURES,
-    Episode,
-    episodes,
-    report,
-    run,
-    scenarios,
-    statistics,
-)
+from push_study.bench_push.episode import MEASURES, run
 from push_study.bench_push.room import Room
 from push_study.bench_push.room import python as ready
+from push_study.by_scenario import Episode, episodes, scenarios
 from push_study.pool import Row
 from push_study.study import StudyOptions
 
@@ -51,4 +45,9 @@ def trial(task: Episode) -> Row:
 
 def conclude(options: StudyOptions, tasks: Sequence[Any], rows: list[Row]) -> None:
     """A line for each scenario."""
-    report(options, rows, "delivered all in")
+    by_scenario.report(options, rows, "delivered all in", MEASURES)
+
+
+def statistics(rows: list[Row]) -> dict[str, Any]:
+    """See ``by_scenario``."""
+    return by_scenario.statistics(rows, MEASURES)

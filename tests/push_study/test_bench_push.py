@@ -10,7 +10,8 @@ import pytest
 from planar_push.main import main
 from push_model.outlines import overlap
 from push_model.settings import SettingsError
-from push_study.bench_push import episode, policies, room
+from push_study.bench_push import policies, room
+from push_study.by_scenario import Episode
 from push_study.experiments import bench_push, box_delivery
 from push_study.study import StudyOptions
 
@@ -271,11 +272,11 @@ class Throwing(MadeUp):
 @pytest.mark.parametrize("scenario", bench_push.SCENARIOS)
 def test_an_episode_in_which_a_box_is_thrown_does_not_count(monkeypatch, scenario):
     monkeypatch.setattr(bench_push, "Room", MadeUp)
-    row = bench_push.trial(episode.Episode(scenario, 1))
+    row = bench_push.trial(Episode(scenario, 1))
     assert not row["success"] and row["reason"] == "1 of 2 boxes are left"
     assert row["time_s"] == pytest.approx(0.8) and row["share"] == 0.5
     monkeypatch.setattr(bench_push, "Room", Throwing)
-    row = bench_push.trial(episode.Episode(scenario, 1))
+    row = bench_push.trial(Episode(scenario, 1))
     assert not row["success"] and "threw a box by 1.5 m" in row["reason"]
 
 
@@ -293,7 +294,7 @@ def test_a_crashed_episode_counts_as_one_that_is_not_cleared(tmp_path, capsys):
 @pytest.mark.long
 @pytest.mark.skipif(not installed(), reason="the environment of benchnpin is not installed")
 def test_the_open_room_is_cleared_and_equal_seeds_give_equal_rows():
-    tasks = [episode.Episode("clear-sweeps", seed) for seed in (1, 2, 3)]
+    tasks = [Episode("clear-sweeps", seed) for seed in (1, 2, 3)]
     rows = [bench_push.trial(task) for task in tasks]
     assert all(row["success"] and row["efficiency"] > 0.6 for row in rows)
     again = bench_push.trial(tasks[1])

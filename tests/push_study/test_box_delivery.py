@@ -7,7 +7,8 @@ import pytest
 
 from push_model import se2
 from push_model.outlines import inside
-from push_study.bench_push import delivery, episode
+from push_study.bench_push import delivery
+from push_study.by_scenario import Episode
 from push_study.experiments import box_delivery
 from tests.push_study.test_bench_push import installed
 
@@ -170,7 +171,7 @@ class MadeUp(FakeRoom):
 @pytest.mark.parametrize("scenario", box_delivery.SCENARIOS)
 def test_an_episode_has_the_measures_of_the_room(monkeypatch, scenario):
     monkeypatch.setattr(box_delivery, "Room", MadeUp)
-    row = box_delivery.trial(episode.Episode(scenario, 1))
+    row = box_delivery.trial(Episode(scenario, 1))
     delivered = row["time_s"] < 119.0  # else the episode ended with boxes left
     assert row["success"] == delivered and row["reason"].endswith("are left") != delivered
     assert row["share"] == 0.7 and row["efficiency"] == 0.6 and row["path_m"] == 2.0
@@ -179,7 +180,7 @@ def test_an_episode_has_the_measures_of_the_room(monkeypatch, scenario):
 @pytest.mark.long
 @pytest.mark.skipif(not installed(), reason="the environment of benchnpin is not installed")
 def test_all_boxes_are_delivered_and_equal_seeds_give_equal_rows():
-    tasks = [episode.Episode("small-pushes", seed) for seed in (1, 2, 3)]
+    tasks = [Episode("small-pushes", seed) for seed in (1, 2, 3)]
     rows = [box_delivery.trial(task) for task in tasks]
     assert all(row["success"] and row["efficiency"] > 0.5 for row in rows)
     again = box_delivery.trial(tasks[1])
