@@ -64,8 +64,9 @@ class GroupPushSettings:
         0.01,
         low=1e-4,
         high=1.0,
-        doc="Distance of the object from the trajectory at which the trajectory slows down; at "
-        "twice this distance it stops (m).",
+        doc="Distance of the object behind the trajectory, along its path, at which the trajectory "
+        "slows down; at twice this distance it stops (m). A turn counts as its angle times the "
+        "radius of the limit surface.",
     )
     position_error: float = bounded(
         0.05, low=1e-3, high=10.0, doc="Position error of the object at which a push fails (m)."
@@ -309,11 +310,22 @@ class GroupPush:
     def _go_on(self, now: float, tick: float, pose: Array) -> None:
         """Move along the trajectory, slower the farther the object is behind."""
         s = self.settings
-        away, _ = self._errors(pose)
-        pace = float(np.clip(2.0 - away / s.behind, 0.0, 1.0))
+        pace = float(np.clip(2.0 - self._lag(pose) / s.behind, 0.0, 1.0))
         self.time += pace * tick
         if pace > 0.1:
             self._moved_on = now
+
+    def _lag(self, pose: Array) -> float:
+        """[m] by which the object is behind: its pose error along the twist of the trajectory.
+
+        Turns count as lengths, times the radius of the limit surface. What is aside of the
+        trajectory does not hold it up: the robots may not be able to make it good before its end.
+        """
+        scale = np.array([1.0, 1.0, self.controller.surface.radius])
+        off = self.trajectory.sample(self.time) - pose
+        off[2] = math.remainder(off[2], 2.0 * math.pi)
+        task = scale * self.trajectory.twist_at(self.time)
+        return max(0.0, float((scale * off) @ task)) / max(float(np.linalg.norm(task)), 1e-9)
 
     def _errors(self, pose: Array) -> tuple[float, float]:
         off = self.trajectory.sample(self.time) - pose
@@ -337,7 +349,8 @@ class GroupPush:
             late = now - self._begin > s.search
             return ("not every robot made contact with the object" if late else ""), ()
         if now - self._moved_on > s.stalled:
-            return f"the object stays {1e3 * away:.0f} mm behind the trajectory", ()
+            behind = 1e3 * self._lag(pose)
+            return f"the object stays {behind:.0f} mm behind the trajectory", ()
         return "", ()
 
 

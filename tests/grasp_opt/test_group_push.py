@@ -9,7 +9,7 @@ import pytest
 from grasp_opt.contact_outline import ContactOutline
 from grasp_opt.group_control import PRINTED_LAW, GroupControlSettings
 from grasp_opt.group_push import ActuationMonitor, GroupPush, GroupPushSettings, Phase
-from grasp_opt.object_trajectory import polynomial
+from grasp_opt.object_trajectory import polynomial, sampled
 from push_model.specs import EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
 from push_study.uncertainty import uncertainty
@@ -23,10 +23,11 @@ WAYS = ContactOutline(ITEM.geometry).way_of_angle(1.5 * math.pi + np.array([-0.6
 
 def run(push, real=ITEM, off=0.01, moved=None, until=40.0, kill=None):
     """The last step, the object's last pose, and the time; moved: robot that starts elsewhere."""
-    starts = push.starts(BEND.pose[0], off)
+    start = push.trajectory.pose[0]
+    starts = push.starts(start, off)
     for index, way in (moved or {}).items():
         starts[index, :2] += way
-    begin, doubt = real.geometric_pose(BEND.pose[0]), uncertainty("none")
+    begin, doubt = real.geometric_pose(start), uncertainty("none")
     with GroupWorld(ROOM, ROBOT, starts, real, begin, doubt, 1, "planar") as world:
         while world.time < until:
             seen, robots = world.see()
@@ -71,6 +72,32 @@ def test_an_object_that_is_too_heavy_ends_the_push():
     assert step.phase is Phase.FAILED and time < 15.0
     assert "behind" in step.reason or "from its trajectory" in step.reason or "do" in step.reason
     assert np.hypot(*(pose - BEND.pose[0])[:2]) < 0.02
+
+
+@pytest.mark.parametrize(("slant", "friction"), [(5.0, 0.02), (15.0, 0.2)])
+def test_what_slips_aside_does_not_hold_the_push_up(slant, friction):
+    """The push goes straight ahead, slanted to the side of the plate by more than the cone of
+    friction: the robots cannot make good what is missing aside. They go on to the end."""
+    item, time = load_object("plate_rectangle"), np.linspace(0.0, 8.0, 81)
+    way, angle = 0.4 * (3.0 * (time / 8.0) ** 2 - 2.0 * (time / 8.0) ** 3), math.radians(slant)
+    poses = np.column_stack([way * math.sin(angle), way * math.cos(angle), 0.0 * way])
+    ways = ContactOutline(item.geometry).way_of_angle(1.5 * math.pi + np.array([-0.5, 0.5]))
+    push = GroupPush(item, ROBOT, ways, sampled(time, poses))
+    step, pose, seconds = run(push, replace(item, contact_friction=friction))
+    assert step.phase is Phase.DONE and seconds < 11.0, step.reason
+    aside, behind, turned = poses[-1] - pose
+    assert 0.02 < aside < 0.05 and abs(behind) < 0.01 and abs(turned) < 0.02
+
+
+def test_an_object_that_turns_too_little_is_behind():
+    """On a turn about the centre of mass only the heading can be behind."""
+    item, time = load_object("plate_rectangle"), np.linspace(0.0, 8.0, 81)
+    turns = sampled(time, np.column_stack([0.0 * time, 0.0 * time, 0.1 * time]))
+    push = GroupPush(item, ROBOT, WAYS[:2], turns)
+    push.time = 4.0
+    radius = item.limit_surface().radius
+    for off, behind in ((0.0, 0.0), (-0.2, 0.2 * radius), (0.2, 0.0)):
+        assert push._lag(np.array([0.01, 0.0, 0.4 + off])) == pytest.approx(behind, abs=1e-9)
 
 
 def test_obedience_tells_who_stands_from_who_waits_and_who_goes():
