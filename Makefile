@@ -13,7 +13,7 @@ CORES = tests/push_model tests/push_scenario tests/push_estimation tests/push_pl
   tests/push_supervisor tests/push_bringup tests/planar_push tests/push_record \
   tests/grasp_opt tests/swarm_push
 
-.PHONY: docs pictures benchpush install demo test test-long test-studies test-fast coverage lint clean
+.PHONY: docs pictures benchpush gco install demo test test-long test-studies test-fast coverage lint clean
 install: $(STAMP)
 
 $(VENV)/bin/python:
@@ -85,5 +85,18 @@ benchpush: $(VENV)/bin/python
 	$(BENCHPUSH)/bin/python -m pip install -q --no-deps benchnpin==0.1.1
 	$(BENCHPUSH)/bin/python -c "import benchnpin.environments.area_clearing"
 
+# GCo for the study gco: the program of its authors with their trained model, as of one revision.
+GCO := .venv-gco
+GCO_SOURCE ?= https://github.com/yoraish/gco
+gco: $(VENV)/bin/python
+	rm -rf $(GCO)
+	$(BIN)/python -m venv $(GCO)
+	$(GCO)/bin/python -m pip install -q -r push_study/gco/requirements.txt
+	git clone -q --no-checkout $(GCO_SOURCE) $(GCO)/gco
+	git -C $(GCO)/gco checkout -q afc27db -- LICENSE data flow_matching gco gco-cpp
+	$(GCO)/bin/python -m pip install -q --no-deps --no-build-isolation -e $(GCO)/gco/flow_matching -e $(GCO)/gco/gco
+	$(GCO)/bin/python -m pip install -q --no-deps --no-build-isolation $(GCO)/gco/gco-cpp
+	$(GCO)/bin/python -c "import gcocpp, gco, mujoco"
+
 clean:
-	rm -rf $(VENV) $(BENCHPUSH) results build *.egg-info
+	rm -rf $(VENV) $(BENCHPUSH) $(GCO) results build *.egg-info

@@ -93,7 +93,16 @@ def test_every_package_that_is_imported_is_a_dependency():
     names = {"yaml": "pyyaml", "PIL": "pillow", **of_pydantic}
     known = {requirement(line) for line in PROJECT["project"]["dependencies"]}
     extra = {"launch", "distributed", "dask", "motioncapture", "shapely", "pytest", "hypothesis"}
-    extra |= {"gymnasium", "pettingzoo", "gym_pusht", "pymunk", "benchnpin"}
+    extra |= {
+        "gymnasium",
+        "pettingzoo",
+        "gym_pusht",
+        "pymunk",
+        "benchnpin",
+        "gco",
+        "torch",
+        "mujoco",
+    }
     ours = {name.split(".")[0] for name in PROJECT["tool"]["setuptools"]["packages"]}
     third = set()
     for package in ours - {"push_config", "benchmarks"}:
