@@ -289,7 +289,9 @@ class GroupPush:
         if failure:
             return GroupStep(Phase.FAILED, 0.0 * twists, command, self.time, failure, dead)
         if not searching and self.time >= self.trajectory.duration:
-            return GroupStep(Phase.DONE, 0.0 * twists, command, self.time)
+            missed = self._missed(estimate)
+            phase = Phase.FAILED if missed else Phase.DONE
+            return GroupStep(phase, 0.0 * twists, command, self.time, missed)
         return GroupStep(Phase.SEARCH if searching else Phase.PUSH, twists, command, self.time)
 
     def _find_offsets(self, now: float, pose: Array, robots: Array) -> None:
@@ -316,16 +318,32 @@ class GroupPush:
             self._moved_on = now
 
     def _lag(self, pose: Array) -> float:
-        """[m] by which the object is behind: its pose error along the twist of the trajectory.
+        """[m] by which the object is behind: the part of its position error along the velocity of
+        the trajectory, or that of its heading error along the turn, times the radius of the limit
+        surface, whichever is greater.
 
-        Turns count as lengths, times the radius of the limit surface. What is aside of the
-        trajectory does not hold it up: the robots may not be able to make it good before its end.
+        What is aside of the trajectory does not hold it up: the robots may not be able to make it
+        good before its end.
         """
-        scale = np.array([1.0, 1.0, self.controller.surface.radius])
-        off = self.trajectory.sample(self.time) - pose
-        off[2] = math.remainder(off[2], 2.0 * math.pi)
-        task = scale * self.trajectory.twist_at(self.time)
-        return max(0.0, float((scale * off) @ task)) / max(float(np.linalg.norm(task)), 1e-9)
+        off, task = self.trajectory.sample(self.time) - pose, self.trajectory.twist_at(self.time)
+        speed = math.hypot(task[0], task[1])
+        along = float(off[:2] @ task[:2]) / speed if speed > 0.0 else 0.0
+        turned = math.remainder(off[2], 2.0 * math.pi) * float(np.sign(task[2]))
+        return max(0.0, along, self.controller.surface.radius * turned)
+
+    def _missed(self, pose: Array) -> str:
+        """Why a push at the end of its trajectory has failed all the same, or nothing: more than
+        half of its way is missing, and so much that the trajectory would have waited for it."""
+        away, turned = self._errors(pose)
+        gone = self.trajectory.pose[-1] - self.trajectory.pose[0]
+        radius = self.controller.surface.radius
+        missing, way = (
+            math.hypot(p, radius * r)
+            for p, r in ((away, turned), (math.hypot(gone[0], gone[1]), gone[2]))
+        )
+        if missing <= max(2.0 * self.settings.behind, 0.5 * way):
+            return ""
+        return f"the push ended {1e3 * away:.0f} mm and {turned:.2f} rad from the end of its way"
 
     def _errors(self, pose: Array) -> tuple[float, float]:
         off = self.trajectory.sample(self.time) - pose

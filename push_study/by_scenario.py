@@ -1,11 +1,12 @@
 """Studies whose trials are a scenario and a seed, and whose measures are compared by scenario."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from push_model.arrays import Array
 from push_model.settings import SettingsError
 from push_study.pool import Row
 from push_study.statistics import mean_interval, wilson
@@ -38,15 +39,17 @@ def scenarios(*parts: Iterable[str]) -> tuple[str, ...]:
     return tuple(names)
 
 
-def statistics(rows: list[Row], measures: Sequence[str]) -> dict[str, Any]:
-    """Interval of the share of episodes that succeed, and of the means of measures."""
+def statistics(
+    rows: list[Row], measures: Sequence[str], of_successes: Collection[str] = ()
+) -> dict[str, Any]:
+    """Interval of the share of episodes that succeed, and of the means of measures. of_successes:
+    measures that are taken of these episodes only."""
     found: dict[str, Any] = {}
     for name in dict.fromkeys(str(r["scenario"]) for r in rows):
         mine, count = finished(rows, name), sum(r["scenario"] == name for r in rows)
         found[f"wilson_{name}"] = wilson(sum(bool(r["success"]) for r in mine), count)
         for measure in measures:
-            values = np.array([float(r[measure]) for r in mine])
-            found[f"{measure}_{name}"] = mean_interval(values)
+            found[f"{measure}_{name}"] = mean_interval(_values(mine, measure, of_successes))
     return found
 
 
@@ -55,7 +58,18 @@ def finished(rows: list[Row], name: str) -> list[Row]:
     return [r for r in rows if r["scenario"] == name and not r.get("crashed")]
 
 
-def report(options: StudyOptions, rows: list[Row], done: str, measures: Sequence[str]) -> None:
+def _values(rows: list[Row], measure: str, of_successes: Collection[str]) -> Array:
+    rows = [r for r in rows if r["success"] or measure not in of_successes]
+    return np.array([float(r[measure]) for r in rows])
+
+
+def report(
+    options: StudyOptions,
+    rows: list[Row],
+    done: str,
+    measures: Sequence[str],
+    of_successes: Collection[str] = (),
+) -> None:
     """A line for each scenario. done: what an episode is that succeeds, in a word."""
     for name in options.scenarios:
         mine, count = finished(rows, name), sum(r["scenario"] == name for r in rows)
@@ -65,5 +79,7 @@ def report(options: StudyOptions, rows: list[Row], done: str, measures: Sequence
         low, high = wilson(good, count)
         print(f"\n{name}: {done} {good} of {count} ({low:.2f} to {high:.2f})")
         for measure in measures:
-            values = np.array([float(r[measure]) for r in mine])
-            print(f"{measure}: mean {values.mean():.2f}, least {values.min():.2f}")
+            values = _values(mine, measure, of_successes)
+            if len(values):
+                ends = f"least {values.min():.2f}, most {values.max():.2f}"
+                print(f"{measure}: mean {values.mean():.2f}, {ends}")

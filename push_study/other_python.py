@@ -1,7 +1,9 @@
 """A script in a process with the Python of another environment: a line of JSON in, a line out."""
 
+import contextlib
 import json
 import os
+import select
 import subprocess
 import tempfile
 from pathlib import Path
@@ -9,6 +11,8 @@ from types import TracebackType
 from typing import Any, Self
 
 from push_model.settings import SettingsError
+
+_END = 10.0  # [s] of wall time that a script may take to end
 
 
 def python_of(what: str, variable: str, environment: str, target: str) -> Path:
@@ -52,20 +56,25 @@ class OtherPython:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._process.communicate()  # it ends with its input
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.communicate(timeout=_END)  # it ends with its input
+        self._process.kill()
+        self._process.wait()
         self._log.close()
 
-    def ask(self, message: dict[str, Any]) -> dict[str, Any]:
-        """Its answer.
+    def ask(self, message: dict[str, Any], limit: float | None = None) -> dict[str, Any]:
+        """Its answer. limit: [s] of wall time to wait for it.
 
         Raises
         ------
-        RuntimeError: the script has ended; with the last line that it said.
+        RuntimeError: the script has ended, with the last line that it said; or there is no answer.
         """
         assert self._process.stdin is not None and self._process.stdout is not None
         try:
             self._process.stdin.write(json.dumps(message) + "\n")
             self._process.stdin.flush()
+            if not select.select([self._process.stdout], [], [], limit)[0]:
+                raise RuntimeError(f"no answer within {limit:.0f} s")
             answer = self._process.stdout.readline()
         except BrokenPipeError:
             answer = ""

@@ -6,12 +6,14 @@ from typing import Any
 
 from push_model.arrays import Array
 from push_study.gco.problems import Problem
+from push_study.gco.worker import STEPS
 from push_study.other_python import OtherPython, python_of
 
 PYTHON = "GCO_PYTHON"
 """Environment variable: the Python of the environment in which GCo is installed."""
-TICK = 7 * 0.003
-"""[s] of a move: see ``worker.STEPS``."""
+TICK = STEPS * 0.003
+"""[s] of a move."""
+_HANGS = 1800.0  # [s] of wall time without an answer; GCo takes about half a minute at most
 
 Told = dict[str, Any]
 """What a room tells: see ``worker.Room.tell``."""
@@ -38,6 +40,10 @@ class Room(OtherPython):
         return self.ask({"move": targets.tolist()})
 
     def solve(self, away: float, turned: float) -> Told:
-        """Let GCo bring the object to the goal, within [m] and [rad]. It also tells the number of
-        its pushes and the CPU time [s] of its computations without the simulation."""
-        return self.ask({"solve": [away, turned]})
+        """Let GCo bring the object to the goal, within [m] and [rad].
+
+        It also tells the number of its pushes and of rounds of planning (some end without a push),
+        why it ended early, if it did, and the CPU time [s] of its computations without the
+        simulation and without loading its model.
+        """
+        return self.ask({"solve": [away, turned]}, _HANGS)

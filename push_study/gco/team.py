@@ -14,7 +14,7 @@ import numpy as np
 from grasp_opt.group_method import GROUP
 from grasp_opt.plan_source import InlinePlans
 from grasp_opt.step_settings import StepSettings
-from push_job.method import Arena, Command, Method, Refusal, Seen, Task
+from push_job.method import Arena, Command, Refusal, Seen, Task
 from push_model.arrays import Array
 from push_model.belief import Belief
 from push_model.bumpers import RingBumper
@@ -42,8 +42,8 @@ ROBOT = RobotSpec(
 """A disc of the simulator as our method sees it. It drives at 0.28 m/s at most; GCo's robots drive
 at 0.17 to 0.22 m/s mostly, and at up to 0.75 m/s."""
 FRICTION = 0.2
-"""Of robots and object, as believed. MuJoCo's coefficient is 1, but its contacts creep, and the
-discs roll along the object: pushed at 45 degrees to its side, an object goes at 32, at 10 degrees
+"""Of robots and object, as believed. MuJoCo's coefficient is 1, but its contacts creep, and discs
+roll along the object: pushed at 45 degrees to the normal of its side, it goes at 32, at 10 degrees
 at 3."""
 SCALE = 5.5
 """Floor friction of the object, 9.8 N, over that of the plates for which the gains of the group
@@ -79,6 +79,7 @@ class Outcome:
 
 def push(room: Room, problem: Problem, away: float, turned: float) -> Outcome:
     """Bring the object to the goal of a problem, within [m] and [rad]."""
+    told, began = room.reset(), time.process_time()
     names = [f"robot_{k}" for k in range(len(problem.robots))]
     item, robots = _item(problem), dict.fromkeys(names, ROBOT)
     GROUP.check(robots, item)
@@ -86,20 +87,17 @@ def push(room: Room, problem: Problem, away: float, turned: float) -> Outcome:
     asked = {"position_tolerance": away, "orientation_tolerance": turned, **SETTINGS}
     plans = InlinePlans(grid, "object", names[0], STEPS)
     method = GROUP.make(Arena(grid, robots, "object", item, GROUP.settings(asked), plans))
-    return _play(room, method, Task((problem.target,)), Belief({"object": item}, robots), names)
-
-
-def _play(room: Room, method: Method, task: Task, belief: Belief, names: list[str]) -> Outcome:
-    told, spent = room.reset(), 0.0
-    discs = Discs(told, names)
+    belief, discs = Belief({"object": item}, robots), Discs(told, names)
+    task = Task((problem.target,))
     answer = method.assess(task, belief, discs.seen(told))
     if isinstance(answer, Refusal):
         return Outcome(told, 0, answer.reason, 0.0)
     method.begin(task, belief)
+    spent = time.process_time() - began
     while True:
-        began = time.thread_time()
+        began = time.process_time()
         commands = method.step(discs.seen(told), belief).commands
-        spent += time.thread_time() - began
+        spent += time.process_time() - began
         if method.status.phase == JobPhase.IDLE:
             break
         if told["time_s"] > LIMIT:

@@ -24,7 +24,8 @@ def main() -> None:
     """Serve standard input until it ends."""
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)  # GCo prints
-    os.environ.update(MPLBACKEND="Agg", OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
+    one = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+    os.environ.update(one, MPLBACKEND="Agg", CUDA_VISIBLE_DEVICES="")
     warnings.simplefilter("ignore")
     import torch
 
@@ -33,6 +34,8 @@ def main() -> None:
     for line in sys.stdin:
         ask = json.loads(line)
         if "reset" in ask:
+            if room is not None:
+                raise RuntimeError("a process has one room")
             room = Room(ask["reset"])
             tell = room.tell()
         elif "solve" in ask:
@@ -124,10 +127,11 @@ class Room:
             self._before = now
 
     def move(self, targets: list[list[float]]) -> None:
-        """Drag the robots evenly to targets, by ``STEPS`` steps."""
+        """Drag the robots evenly to targets, by ``STEPS`` steps, at the height of GCo's own."""
         import mujoco
 
         mocap = self.data.mocap_pos
+        mocap[self._mocap, 2] = 0.5 * self.world.simulator.robot_height + 0.001
         begin = [mocap[k][:2].tolist() for k in self._mocap]
         for step in range(1, STEPS + 1):
             part = step / STEPS
@@ -148,45 +152,55 @@ class Room:
         }
 
     def solve(self, away: float, turned: float) -> dict[str, Any]:
-        """Let GCo play until the object is within tolerances [m, rad], at most 100 pushes."""
+        """Let GCo play until the object is within tolerances [m, rad], for at most 100 rounds of
+        planning. Raises RuntimeError if it ends with an error, which GCo itself only prints."""
         from gco.config import Config
-        from gco.planners.multi.iterative_push_planner import IterativePushPlanner
+        from gco.planners.multi import iterative_push_planner
         from gco.tasks.tasks import ManipulationTask
 
         x, y, heading = self._problem["goal"]
         task = ManipulationTask()
         task.object_id = "object_1"
         task.target_pose = {"position": [x, y], "orientation": heading}
-        settings = {
-            "max_iterations": 100,
-            "goal_tolerance_position": away,
-            "goal_tolerance_orientation": turned,
-            "min_push_distance": 0.02,
-            "visualization_interval": 1,
-            "save_visualizations": False,
-            "visualize_planning": False,
-            "output_dir": tempfile.mkdtemp(),
-            "model_checkpoint": Config.checkpoints.c_r_flex,
-            "model_type": "discrete",
-            "persistent_simulator": True,
-            "planner_type": "a_star",
-        }
-        simulated, play = 0.0, self.world.apply_trajectories
+        simulated, pushes, play = 0.0, 0, self.world.apply_trajectories
+        said: list[str] = []
 
         def timed(*args: Any, **more: Any) -> Any:
-            nonlocal simulated
-            began = time.process_time()
+            nonlocal simulated, pushes
+            began, pushes = time.process_time(), pushes + 1
             try:
                 return play(*args, **more)
             finally:
                 simulated += time.process_time() - began
 
         self.world.apply_trajectories = timed
-        planner = IterativePushPlanner(self.world, params=settings)
-        began = time.process_time()
-        planner.plan_action_trajs(task, visualize=False)
-        spent = time.process_time() - began - simulated
-        return {**self.tell(), "pushes": len(planner.planning_history), "cpu_s": spent}
+        vars(iterative_push_planner)["print"] = lambda *words: said.append(
+            " ".join(map(str, words))
+        )
+        with tempfile.TemporaryDirectory() as folder:
+            settings = {
+                "max_iterations": 100,
+                "goal_tolerance_position": away,
+                "goal_tolerance_orientation": turned,
+                "min_push_distance": 0.02,
+                "visualization_interval": 1,
+                "save_visualizations": False,
+                "visualize_planning": False,
+                "output_dir": folder,
+                "model_checkpoint": Config.checkpoints.c_r_flex,
+                "model_type": "discrete",
+                "persistent_simulator": True,
+                "planner_type": "a_star",
+            }
+            planner = iterative_push_planner.IterativePushPlanner(self.world, params=settings)
+            began = time.process_time()
+            planner.plan_action_trajs(task, visualize=False)
+            spent = time.process_time() - began - simulated
+        if errors := [text for text in said if "Error during planning" in text]:
+            raise RuntimeError(errors[0])
+        why = next((text for text in said if "No path found" in text), "")
+        rounds = len(planner.planning_history)
+        return {**self.tell(), "pushes": pushes, "rounds": rounds, "why": why, "cpu_s": spent}
 
 
 if __name__ == "__main__":

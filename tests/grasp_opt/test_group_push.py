@@ -76,8 +76,8 @@ def test_an_object_that_is_too_heavy_ends_the_push():
 
 @pytest.mark.parametrize(("slant", "friction"), [(5.0, 0.02), (15.0, 0.2)])
 def test_what_slips_aside_does_not_hold_the_push_up(slant, friction):
-    """The push goes straight ahead, slanted to the side of the plate by more than the cone of
-    friction: the robots cannot make good what is missing aside. They go on to the end."""
+    """The push goes straight ahead, at an angle to the normal of the pushed side that is greater
+    than that of friction: robots cannot make good what is missing aside. They go on to the end."""
     item, time = load_object("plate_rectangle"), np.linspace(0.0, 8.0, 81)
     way, angle = 0.4 * (3.0 * (time / 8.0) ** 2 - 2.0 * (time / 8.0) ** 3), math.radians(slant)
     poses = np.column_stack([way * math.sin(angle), way * math.cos(angle), 0.0 * way])
@@ -89,15 +89,36 @@ def test_what_slips_aside_does_not_hold_the_push_up(slant, friction):
     assert 0.02 < aside < 0.05 and abs(behind) < 0.01 and abs(turned) < 0.02
 
 
-def test_an_object_that_turns_too_little_is_behind():
-    """On a turn about the centre of mass only the heading can be behind."""
+def test_what_is_behind_is_along_the_trajectory():
+    """A bend with the object at a heading of about 1 rad. Errors ahead, aside and of the heading
+    beyond the trajectory do not count, and do not make up for each other."""
     item, time = load_object("plate_rectangle"), np.linspace(0.0, 8.0, 81)
-    turns = sampled(time, np.column_stack([0.0 * time, 0.0 * time, 0.1 * time]))
-    push = GroupPush(item, ROBOT, WAYS[:2], turns)
-    push.time = 4.0
-    radius = item.limit_surface().radius
-    for off, behind in ((0.0, 0.0), (-0.2, 0.2 * radius), (0.2, 0.0)):
-        assert push._lag(np.array([0.01, 0.0, 0.4 + off])) == pytest.approx(behind, abs=1e-9)
+    bend = sampled(time, np.column_stack([0.05 * time, 0.0 * time, 0.6 + 0.1 * time]))
+    push = GroupPush(item, ROBOT, WAYS[:2], bend)
+    push.time, radius = 4.0, item.limit_surface().radius
+    for off, behind in (
+        ([-0.01, 0.0, 0.0], 0.01), ([0.01, 0.0, 0.0], 0.0), ([0.0, 0.03, 0.0], 0.0),
+        ([0.0, 0.0, -0.2], 0.2 * radius), ([0.0, 0.0, 0.2], 0.0), ([0.05, 0.0, -0.2], 0.2 * radius),
+        ([-0.01, 0.0, 0.2], 0.01), ([0.0, 0.0, 2.0 * math.pi - 0.2], 0.2 * radius),
+    ):  # fmt: skip
+        pose = np.array([0.2, 0.0, 1.0]) + off
+        assert push._lag(pose) == pytest.approx(behind, abs=1e-9), off
+    push.time = bend.duration + 0.01  # at rest
+    assert push._lag(bend.pose[-1] - [0.04, 0.0, 0.0]) == 0.0
+
+
+@pytest.mark.parametrize(("missing", "failed"), [(0.3, True), (0.15, False)])
+def test_a_push_that_ends_far_from_the_end_of_its_way_has_failed(missing, failed):
+    """The object lies aside all the time, by a part of the way of 0.1 m."""
+    settings = GroupPushSettings(position_error=1.0, behind=0.005)
+    time = np.linspace(0.0, 4.0, 41)
+    way = 0.1 * (3.0 * (time / 4.0) ** 2 - 2.0 * (time / 4.0) ** 3)
+    push = GroupPush(
+        ITEM, ROBOT, WAYS, sampled(time, np.column_stack([0.0 * way, way, 0.0 * way])), settings
+    )
+    push.time = push.trajectory.duration
+    assert bool(push._missed(push.trajectory.pose[-1] - [2.0 * 0.1 * missing, 0.0, 0.0])) is failed
+    assert not push._missed(push.trajectory.pose[-1] - [0.009, 0.0, 0.0])
 
 
 def test_obedience_tells_who_stands_from_who_waits_and_who_goes():

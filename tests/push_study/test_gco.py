@@ -3,6 +3,7 @@
 import math
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from push_study.by_scenario import Episode
 from push_study.experiments import gco
 from push_study.gco import room, team
 from push_study.gco.problems import ROOMS, problem
+from push_study.other_python import OtherPython
 from push_study.study import StudyOptions
 from sim_bridge.planar_world import PlanarSettings, PlanarWorld
 
@@ -146,7 +148,7 @@ class PlanarRoom:
         return self.tell()
 
     def solve(self, away, turned):
-        return {**self.tell(), "pushes": 0, "cpu_s": 0.0}
+        return {**self.tell(), "pushes": 0, "rounds": 0, "why": "", "cpu_s": 0.0}
 
 
 @pytest.mark.parametrize("scenario", ["open-2-group-wide", "given-3-group-narrow"])
@@ -188,6 +190,48 @@ def test_methods_are_compared_at_the_problems_that_both_solve(tmp_path, capsys):
     assert found["wilson_open-2-gco-wide"][1] < 1.0
     gco.conclude(StudyOptions(("open-2-gco-wide",), 5, 1, tmp_path), [], rows)
     assert "reached 4 of 5" in capsys.readouterr().out
+
+
+def test_touches_count_also_where_the_goal_is_not_reached():
+    rows = []
+    for seed, good in ((1, True), (2, False), (3, False)):
+        row = {"scenario": "open-2-gco-wide", "seed": seed, "success": good}
+        rows.append(row | dict.fromkeys(gco.MEASURES, 1.0) | {"touched": int(not good)})
+    low, high = gco.statistics(rows)["touched_open-2-gco-wide"]
+    assert low + high == pytest.approx(4.0 / 3.0)
+
+
+def test_a_script_that_hangs_is_ended(tmp_path):
+    script = tmp_path / "hangs.py"
+    script.write_text("import sys, time\nsys.stdin.readline()\ntime.sleep(600)\n")
+    with OtherPython(Path(sys.executable), script) as other:
+        process = other._process
+        with pytest.raises(RuntimeError, match="no answer within 1 s"):
+            other.ask({}, 1.0)
+        process.kill()
+    assert process.poll() is not None
+
+
+@pytest.mark.skipif(not installed(), reason="the environment of GCo is not installed")
+def test_the_room_tells_time_ways_and_touches():
+    """A robot is dragged past the object into the obstacle; the object's heading is as it was told,
+    a quarter turn more than GCo counts it."""
+    what = replace(problem("pillar", 2, 1), robots=((2.0, 2.0), (3.0, 3.0)))
+    what = replace(what, obstacles=((2.3, 2.0, 0.1),), start=(0.0, 1.0, 0.4))
+    with room.Room(what) as made:
+        told, targets = made.reset(), np.array(what.robots)
+        assert told["object"] == pytest.approx([0.0, 1.0, 0.4 + 0.5 * math.pi], abs=1e-6)
+        assert told["time_s"] == told["path_m"] == 0.0 and not told["touched"]
+        for k in range(100):
+            if targets[0, 0] < 2.2:
+                targets[0, 0] += 0.1 * room.TICK
+            told = made.move(targets)
+            assert told["time_s"] == pytest.approx((k + 1) * room.TICK)
+            if told["robots"][0][0] < 2.145:
+                assert not told["touched"]
+        assert told["touched"] and told["path_m"] == pytest.approx(0.15, abs=0.01)
+        with pytest.raises(RuntimeError, match="one room"):
+            made.reset()
 
 
 @pytest.mark.long
