@@ -28,6 +28,7 @@ from push_model.settings import bounded, settings
 from push_model.specs import ObjectSpec, RobotSpec
 
 _LISTEN = 0.3  # [s] over which gaps are averaged, against the noise of the poses
+_STILL = 1e-6  # [m/s], [rad/s] below which a trajectory does not move, or does not turn
 _GAP = 0.2  # [s] between ticks from which on they are no longer one after the other
 
 
@@ -326,9 +327,10 @@ class GroupPush:
         good before its end.
         """
         off, task = self.trajectory.sample(self.time) - pose, self.trajectory.twist_at(self.time)
-        speed = math.hypot(task[0], task[1])
-        along = float(off[:2] @ task[:2]) / speed if speed > 0.0 else 0.0
-        turned = math.remainder(off[2], 2.0 * math.pi) * float(np.sign(task[2]))
+        speed, turning = math.hypot(task[0], task[1]), float(task[2])
+        along = float(off[:2] @ task[:2]) / speed if speed > _STILL else 0.0
+        turned = math.remainder(off[2], 2.0 * math.pi) * float(np.sign(turning))
+        turned = turned if abs(turning) > _STILL else 0.0
         return max(0.0, along, self.controller.surface.radius * turned)
 
     def _missed(self, pose: Array) -> str:

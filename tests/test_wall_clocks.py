@@ -86,7 +86,7 @@ DECIDES_NOTHING = {
     "push_record/recorder.py": "stamps of a live bag",
     "push_study/experiments/pusht.py:trial": COST,
     "push_study/bench_push/episode.py:run": COST,
-    "push_study/gco/team.py:_play": COST,
+    "push_study/gco/team.py:push": COST,
     "push_study/gco/worker.py:Room.solve": COST,
     "push_study/leaderboard/match.py:play": COST,
     "push_study/progress.py": PERSON,
