@@ -1,6 +1,7 @@
 """The README's tables equal the running graph."""
 
 import re
+import time
 from pathlib import Path
 
 import pytest
@@ -79,31 +80,41 @@ def two_that_decide_for_themselves():
 
 
 def look(scenario, system, nodes):
+    """The graph, once it no longer changes: each node tells of its topics by messages."""
     with own_domain(), LockstepRun(scenario, system=system, quiet=True) as run:
         run.start()
-        found = {}
-        me = run.observer
-        for row, (name, space) in nodes.items():
-            heard = {t for t, _ in me.get_subscriber_names_and_types_by_node(name, space)}
-            told = {t for t, _ in me.get_publisher_names_and_types_by_node(name, space)}
-            served = {t for t, _ in me.get_service_names_and_types_by_node(name, space)}
-            own = f"{space.rstrip('/')}/{name}/"
-            parameters = {
-                s
-                for s in served
-                if s.startswith(own) and ("parameter" in s or "type_description" in s)
-            }
-            actions = {t for t, _ in get_action_server_names_and_types_by_node(me, name, space)}
-            asked = {t for t, _ in me.get_client_names_and_types_by_node(name, space)}
-            goals = {t for t, _ in get_action_client_names_and_types_by_node(me, name, space)}
-            found[row] = (
-                {t for t in heard if "/_action/" not in t} - OF_ALL,
-                {t for t in told if "/_action/" not in t} - OF_ALL,
-                {s for s in served - parameters if "/_action/" not in s} | actions,
-                {s for s in asked if "/_action/" not in s} | goals,
-            )
-            assert "/diagnostics" in told, row
-        return found
+        before = None
+        for _ in range(100):
+            complete, found = seen_by(run.observer, nodes)
+            if complete and found == before:
+                return found
+            before = found
+            time.sleep(0.2)
+        raise AssertionError(f"the graph is not complete after 20 s: {found}")
+
+
+def seen_by(me, nodes):
+    """Whether every node tells its diagnostics, and what each does."""
+    found, complete = {}, True
+    for row, (name, space) in nodes.items():
+        heard = {t for t, _ in me.get_subscriber_names_and_types_by_node(name, space)}
+        told = {t for t, _ in me.get_publisher_names_and_types_by_node(name, space)}
+        served = {t for t, _ in me.get_service_names_and_types_by_node(name, space)}
+        own = f"{space.rstrip('/')}/{name}/"
+        parameters = {
+            s for s in served if s.startswith(own) and ("parameter" in s or "type_description" in s)
+        }
+        actions = {t for t, _ in get_action_server_names_and_types_by_node(me, name, space)}
+        asked = {t for t, _ in me.get_client_names_and_types_by_node(name, space)}
+        goals = {t for t, _ in get_action_client_names_and_types_by_node(me, name, space)}
+        found[row] = (
+            {t for t in heard if "/_action/" not in t} - OF_ALL,
+            {t for t in told if "/_action/" not in t} - OF_ALL,
+            {s for s in served - parameters if "/_action/" not in s} | actions,
+            {s for s in asked if "/_action/" not in s} | goals,
+        )
+        complete &= "/diagnostics" in told
+    return complete, found
 
 
 def test_every_node_has_a_row_and_no_other():
