@@ -16,9 +16,10 @@ from push_study.experiments import bench_push, box_delivery
 from push_study.study import StudyOptions
 
 
-def installed():
+def installed(of=room):
+    """Whether the environment is there that a module needs, ``room`` of a study's package."""
     try:
-        room.python()
+        of.python()
     except SettingsError:
         return False
     return True

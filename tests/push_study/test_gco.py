@@ -19,14 +19,7 @@ from push_study.gco.problems import ROOMS, problem
 from push_study.other_python import OtherPython
 from push_study.study import StudyOptions
 from sim_bridge.planar_world import PlanarSettings, PlanarWorld
-
-
-def installed():
-    try:
-        room.python()
-    except SettingsError:
-        return False
-    return True
+from tests.push_study.test_bench_push import installed
 
 
 def test_without_its_environment_the_study_says_what_to_do(tmp_path, monkeypatch, capsys):
@@ -212,7 +205,7 @@ def test_a_script_that_hangs_is_ended(tmp_path):
     assert process.poll() is not None
 
 
-@pytest.mark.skipif(not installed(), reason="the environment of GCo is not installed")
+@pytest.mark.skipif(not installed(room), reason="the environment of GCo is not installed")
 def test_the_room_tells_time_ways_and_touches():
     """A robot is dragged past the object into the obstacle; the object's heading is as it was told,
     a quarter turn more than GCo counts it."""
@@ -235,7 +228,7 @@ def test_the_room_tells_time_ways_and_touches():
 
 
 @pytest.mark.long
-@pytest.mark.skipif(not installed(), reason="the environment of GCo is not installed")
+@pytest.mark.skipif(not installed(room), reason="the environment of GCo is not installed")
 @pytest.mark.parametrize("name", ROOMS)
 def test_both_reach_goals_and_equal_seeds_give_equal_rows(name):
     for method in gco.METHODS:
