@@ -13,7 +13,7 @@ CORES = tests/push_model tests/push_scenario tests/push_estimation tests/push_pl
   tests/push_supervisor tests/push_bringup tests/planar_push tests/push_record \
   tests/grasp_opt tests/swarm_push
 
-.PHONY: docs pictures benchpush gco install demo test test-long test-studies test-fast coverage lint clean
+.PHONY: docs pictures benchpush gco relopush install demo test test-long test-studies test-fast coverage lint clean
 install: $(STAMP)
 
 $(VENV)/bin/python:
@@ -98,5 +98,24 @@ gco: $(VENV)/bin/python
 	$(GCO)/bin/python -m pip install -q --no-deps --no-build-isolation $(GCO)/gco/gco-cpp
 	$(GCO)/bin/python -c "import gcocpp, gco, mujoco"
 
+# ReloPush for the study relopush: the planner of its authors, compiled as of one revision, without ROS 1. It needs a
+# C++ compiler and the headers of Boost, Eigen and OMPL (Debian, Ubuntu: pkg-config libboost-graph-dev libeigen3-dev libompl-dev).
+RELOPUSH := .relopush
+RELOPUSH_SOURCE ?= https://github.com/fluentrobotics/ReloPush
+ROS1 := ros/ros std_msgs/Float32 std_msgs/String nav_msgs/Path geometry_msgs/PoseStamped \
+  geometry_msgs/PoseWithCovarianceStamped geometry_msgs/TransformStamped visualization_msgs/Marker \
+  visualization_msgs/MarkerArray tf/tf tf/transform_listener tf_conversions/tf_eigen eigen_conversions/eigen_msg
+RELOPUSH_PARTS := graph_info edge_construction dijkstra_tools reloPush/movableObject reloPush/color_print \
+  reloPush/parse_testdata reloPush/params reloPush/push_pose_tools reloPush/data_collector reloPush/hexNfloat \
+  omplTools/fromOMPL omplTools/dubins_tools pathPlanTools/tf_tools pathPlanTools/path_planning_tools
+relopush:
+	rm -rf $(RELOPUSH)
+	git clone -q --no-checkout $(RELOPUSH_SOURCE) $(RELOPUSH)/relopush
+	git -C $(RELOPUSH)/relopush checkout -q 05e17ca -- LICENSE include src testdata
+	@sed 's|@PROJECT_NAME@|reloPush|; s|@CMAKE_CURRENT_SOURCE_DIR@|.|' $(RELOPUSH)/relopush/include/config.h.in > $(RELOPUSH)/relopush/include/config.h
+	@for h in $(ROS1); do mkdir -p $(RELOPUSH)/ros1/$${h%/*} && echo '#include "ros1.h"' > $(RELOPUSH)/ros1/$$h.h; done
+	@cd $(RELOPUSH)/relopush && $(CXX) -std=c++17 -O2 -w -DBOOST_ALLOW_DEPRECATED_HEADERS $$(pkg-config --cflags ompl eigen3) -I ../../push_study/relopush \
+	  -I ../ros1 -I . -I include -I src/pathPlanTools ../../push_study/relopush/plan.cpp $(RELOPUSH_PARTS:%=src/%.cpp) -lompl -o ../plan
+
 clean:
-	rm -rf $(VENV) $(BENCHPUSH) $(GCO) results build *.egg-info
+	rm -rf $(VENV) $(BENCHPUSH) $(GCO) $(RELOPUSH) results build *.egg-info

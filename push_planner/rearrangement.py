@@ -86,14 +86,14 @@ class RearrangementSettings:
 class Move:
     """One object to one pose.
 
-    start, goal: ``(3,)`` [m, m, rad] of the object's geometric frame. cost: [s] of the plan of
-    pushes that was found. aside: whether the pose is not the object's goal.
+    start, goal: ``(3,)`` [m, m, rad] of the object's geometric frame. plan: the pushes that were
+    found; others may be made. aside: whether the pose is not the object's goal.
     """
 
     object: str
     start: Array
     goal: Array
-    cost: float
+    plan: PushPlan
     aside: bool = False
 
 
@@ -255,7 +255,7 @@ class Rearrangement:
         except PlanningFailed:
             return None
         last = plan.segments[-1].trajectory.pose[-1]
-        move = Move(name, start, goal, plan.cost, aside)
+        move = Move(name, start, goal, plan, aside)
         return move, Arrangement(where, last)
 
     # What stands in the way

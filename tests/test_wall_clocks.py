@@ -88,6 +88,8 @@ DECIDES_NOTHING = {
     "push_study/bench_push/episode.py:run": COST,
     "push_study/gco/team.py:push": COST,
     "push_study/gco/worker.py:Room.solve": COST,
+    "push_study/experiments/relopush.py:_rebuilt": COST,
+    "push_study/experiments/relopush.py:_ours": COST,
     "push_study/leaderboard/match.py:play": COST,
     "push_study/progress.py": PERSON,
     "push_ros/method_node.py:MethodNode.__init__": LIVE,

@@ -1,5 +1,6 @@
 """One robot, several boxes, a goal for each: the scenes of ReloPush and of its generator."""
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +22,7 @@ from push_ros.validation import FRAME
 from push_scenario.scenario import Scenario
 from push_study.graph_run import LockstepRun
 from push_study.pool import Row
-from push_study.relopush import SCENES, scenario_of
+from push_study.relopush.scenes import SCENES, scenario_of
 from push_study.statistics import wilson
 from push_study.study import StudyOptions
 from push_study.uncertainty import uncertainty
@@ -36,7 +37,7 @@ _LIMIT = 1500.0  # [s] of simulated time
 
 @dataclass(frozen=True)
 class RearrangeTask:
-    """One trial. scenario: a scene, see ``push_study.relopush``."""
+    """One trial. scenario: a scene, see ``push_study.relopush.scenes``."""
 
     scenario: str
     seed: int
@@ -47,7 +48,8 @@ class RearrangeTask:
 class Watch(Node):
     """Sends the goals, and sees from ground truth how the boxes end and what they touch.
 
-    poses: ``(3,)`` by name. state: newest of the rearranger. moves, aside: that it has begun.
+    poses: ``(3,)`` by name. ways: [m] that each body has moved, by name. state: newest of the
+    rearranger. moves, aside: that it has begun.
     collisions: pairs of bodies that touched in a tick, but for the robot with a box.
     """
 
@@ -55,6 +57,7 @@ class Watch(Node):
         super().__init__("rearrange_watch")
         self._robot = robot
         self.poses: dict[str, Array] = {}
+        self.ways: defaultdict[str, float] = defaultdict(float)
         self.state: JobState | None = None
         self.moves = self.aside = self.collisions = 0
         self._publisher = self.create_publisher(Poses, names.team(GOALS), COMMAND)
@@ -82,7 +85,10 @@ class Watch(Node):
         return s is not None and (s.refusals > 0 or (s.job > 0 and s.state == JobState.IDLE))
 
     def _on_truth(self, message: Poses) -> None:
-        self.poses.update(poses_from_ros(message)[0])
+        found = poses_from_ros(message)[0]
+        for name, pose in found.items():
+            self.ways[name] += float(np.hypot(*(pose - self.poses.get(name, pose))[:2]))
+        self.poses.update(found)
 
     def _on_contacts(self, message: Contacts) -> None:
         for pair in map(set, zip(message.body_a, message.body_b, strict=True)):
@@ -164,6 +170,8 @@ def run_rearrangement(
         "replans": int(state.replans),
         "collisions": seen.collisions,
         "duration_s": took,
+        "way_m": sum(seen.ways[name] for name in believed.arrangement),
+        "path_m": seen.ways[believed.robot()[0]],
         "planning_cpu_s": planning,
     }
 
@@ -184,6 +192,7 @@ def conclude(options: StudyOptions, tasks: Sequence[RearrangeTask], rows: list[R
     """A line for each scene."""
     print(
         "\nscene        executed  position [mm]: mean, worst  moves  aside  planning [s]  time [s]"
+        "  boxes [m]  robot [m]"
     )
     for name in options.scenarios:
         count = sum(r.get("scenario") == name for r in rows)
@@ -195,12 +204,19 @@ def conclude(options: StudyOptions, tasks: Sequence[RearrangeTask], rows: list[R
             continue
         mean = {
             k: float(np.mean([float(r[k]) for r in mine]))
-            for k in ("mean_position_error_m", "moves", "moved_aside", "duration_s")
+            for k in (
+                "mean_position_error_m",
+                "moves",
+                "moved_aside",
+                "duration_s",
+                "way_m",
+                "path_m",
+            )
         }
         worst = max(float(r["position_error_m"]) for r in mine)
         plan = float(np.median([float(r["planning_cpu_s"]) for r in mine]))
         print(
             f"{name:12} {len(good):3}/{count:<3}   {1e3 * mean['mean_position_error_m']:8.2f}, "
             f"{1e3 * worst:.2f}            {mean['moves']:5.1f}  {mean['moved_aside']:5.1f}  "
-            f"{plan:6.2f}  {mean['duration_s']:8.0f}"
+            f"{plan:6.2f}  {mean['duration_s']:8.0f}  {mean['way_m']:9.2f}  {mean['path_m']:9.2f}"
         )

@@ -1,17 +1,16 @@
 """Dubins pushes: the planner of ReloPush (Ahn and Mavrogiannis, arXiv 2409.18231) for one object.
 
 The object stays where it is on the bumper as long as the robot's path bends no more than a stable
-push allows. A push from a side is therefore a Dubins path of the robot, from behind the object to
-where it stands when the object is at its goal. Of all sides, the shortest path that is clear is
-taken. If no path is clear, the object is first pushed straight ahead, from another side, to a place
-from which one is (pre-relocation): the plan that is shortest in all.
+push allows, so a push is a Dubins path of the robot: see ``dubins_plans``.
 
 Filled in, or other than in ReloPush:
 
 - ReloPush plans for several objects, and moves others out of the way; here there is one, and
-  obstacles cannot be moved. Its graph is a search over its one or two pushes.
+  obstacles cannot be moved. Therefore an object is also relocated if obstacles block its path.
 - The bend is the tightest that an ellipsoidal limit surface allows with ``friction_trust`` of the
   believed friction. ReloPush has one turning radius for its car and its boxes.
+- The path is that of the robot's axle. In ReloPush, it is that of the object, and the car follows
+  it.
 - There, a controller of a car follows the path; here the robot steers by how far it is from the
   path and from its direction, within the bends of a stable push.
 - ReloPush plans once; here the robot plans anew after each push that ends off the goal.
@@ -21,10 +20,8 @@ Bodies that are not on the map are not avoided in a push.
 """
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
-from ompl import base
 
 from push_job.method import Arena, MethodSpec, Seen, Task
 from push_job.report import Figure, Report, polyline
@@ -33,6 +30,7 @@ from push_model.arrays import Array
 from push_model.belief import Belief
 from push_model.settings import settings
 from push_model.specs import RobotSpec
+from push_study.rivals.dubins_plans import DubinsPlan, Push, dubins_plans
 from push_study.rivals.repeated_pusher import (
     ACCELERATION,
     CREEP,
@@ -42,8 +40,6 @@ from push_study.rivals.repeated_pusher import (
 from push_study.rivals.side_contact import SECTIONS, check_team
 from push_study.rivals.stable_grips import Grip, GripSettings, grips
 
-_EVERY, _RELOCATED = 0.01, 0.1  # [m] between poses of a path, and between places tried
-_FARTHEST, _LONGEST = 3.0, 20.0  # [m] that an object is relocated; of a path
 _CLEAR = 0.01  # [m] from obstacles of the map, if there is so much where a push begins
 _WITHIN = 0.12  # [m] of a path in which a robot comes back to it
 
@@ -71,54 +67,30 @@ class DubinsPusher(RepeatedPusher):
         found = grips(self._own.friction_trust, belief, spec, self._arena.object)
         if not found:
             return "no side of the object can be pushed without slipping"
-        item = self._item.mass_pose(seen)
         blocked = "no Dubins path is clear, also after a straight push"
-        for offers in (self._direct, self._relocating):
-            for _, grip, path in sorted(offers(item, found, spec), key=lambda p: p[0]):
-                to = f"side {grip.side.index}"
-                blocked = self._set_out(robot, seen, grip.grasp, belief, to)
-                if not blocked:
-                    self._grip, self._path = grip, path
-                    return ""
+        for plan in self._plans(self._item.mass_pose(seen), found, spec):
+            grip = found[plan.push]
+            to = f"side {grip.side.index}"
+            blocked = self._set_out(robot, seen, grip.grasp, belief, to)
+            if not blocked:
+                self._grip, self._path = grip, plan.path
+                return ""
         return blocked
 
-    def _direct(
-        self, item: Array, found: tuple[Grip, ...], spec: RobotSpec
-    ) -> Iterator[tuple[float, Grip, Array]]:
-        """Length [m] and poses ``(n, 3)`` of the robot, for each side whose path is clear."""
-        goal = self._item.mass_pose(self._goal)
-        for grip in found:
-            back = se2.inverse(grip.grasp)
-            path, length = dubins(se2.compose(item, back), se2.compose(goal, back), _radius(grip))
-            if length <= _LONGEST and self._clear(path, grip, spec):
-                yield length, grip, path
-
-    def _relocating(
-        self, item: Array, found: tuple[Grip, ...], spec: RobotSpec
-    ) -> Iterator[tuple[float, Grip, Array]]:
-        """The same of plans that begin with a straight push; the path is that of this push."""
-        for grip in found:
-            start = se2.compose(item, se2.inverse(grip.grasp))
-            for far in np.arange(_RELOCATED, _FARTHEST, _RELOCATED):
-                along = np.linspace(0.0, far, max(2, round(far / _EVERY)))
-                rows = np.column_stack([along, np.zeros((len(along), 2))])
-                path = np.array([se2.compose(start, row) for row in rows])
-                if not self._clear(path, grip, spec):
-                    break
-                there = se2.compose(path[-1], grip.grasp)
-                others = tuple(g for g in found if g is not grip)
-                lengths = [length for length, _, _ in self._direct(there, others, spec)]
-                if lengths:
-                    yield float(far) + min(lengths), grip, path
+    def _plans(self, item: Array, found: tuple[Grip, ...], spec: RobotSpec) -> list[DubinsPlan]:
+        """For an object whose mass is at a pose ``(3,)``, best first; see ``dubins_plans``."""
+        pushes = [Push(grip.grasp, _radius(grip)) for grip in found]
+        goals = (self._item.mass_pose(self._goal),)
+        return dubins_plans(item, goals, pushes, lambda p, k: self._clear(p, found[k], spec))
 
     def _clear(self, path: Array, grip: Grip, spec: RobotSpec) -> bool:
-        """Whether object and robot keep away from obstacles of the map."""
+        """Whether the robot fits behind the object, and both keep away from obstacles."""
+        field = self._side.field
+        robot = field.clearances(spec.outline, path)
         items = np.array([se2.compose(pose, grip.grasp) for pose in path])
-        for outline, poses in ((self._item.geometry.outline, items), (spec.outline, path)):
-            room = self._side.field.clearances(outline, poses)
-            if room.min() < min(_CLEAR, room[0]):
-                return False
-        return True
+        item = field.clearances(self._item.geometry.outline, items)
+        near = any(room.min() < min(_CLEAR, room[0]) for room in (robot, item))
+        return bool(robot[0] > 0.0) and not near
 
     def _touched(self, item: Array) -> None:
         super()._touched(item)
@@ -152,26 +124,6 @@ class DubinsPusher(RepeatedPusher):
 def _radius(grip: Grip) -> float:
     """[m] of the tightest bend to both sides."""
     return 1.0 / min(-grip.limits.minimum, grip.limits.maximum)
-
-
-def dubins(start: Array, goal: Array, radius: float) -> tuple[Array, float]:
-    """Shortest path of bends no tighter than a radius [m] between poses ``(3,)``, by OMPL: poses
-    ``(n, 3)``, about ``_EVERY`` apart (none where it is longer than ``_LONGEST``); its length [m].
-    """
-    space = base.DubinsStateSpace(radius)
-    a, b, between = (space.allocState() for _ in range(3))
-    for state, (x, y, heading) in ((a, start), (b, goal)):
-        state.setX(float(x))
-        state.setY(float(y))
-        state.setYaw(float(se2.wrap(float(heading))))
-    length = float(space.distance(a, b))
-    if length > _LONGEST:
-        return np.zeros((0, 3)), length
-    poses = []
-    for part in np.linspace(0.0, 1.0, max(2, math.ceil(length / _EVERY) + 1)):
-        space.interpolate(a, b, float(part), between)
-        poses.append((between.getX(), between.getY(), between.getYaw()))
-    return np.array(poses), length
 
 
 METHOD = MethodSpec(

@@ -14,7 +14,7 @@ from push_planner.among_bodies import planner_among
 from push_planner.push_plan import PlanError, PlanningFailed
 from push_planner.rearrangement import Rearrangement, RearrangementSettings
 from push_scenario.scenario import load_scenario
-from push_study.relopush import SCENES, scenario_of
+from push_study.relopush.scenes import SCENES, scenario_of
 from tests.samples import slice_and_study
 
 
@@ -113,8 +113,8 @@ def test_objects_at_their_goals_stay():
 def test_equal_questions_have_equal_answers():
     scenario = scenario_of("relopush-3", 3)
     first, second = solve(scenario)[1], solve(scenario)[1]
-    assert [(m.object, m.goal.tolist(), m.cost) for m in first] == [
-        (m.object, m.goal.tolist(), m.cost) for m in second
+    assert [(m.object, m.goal.tolist(), m.plan.cost) for m in first] == [
+        (m.object, m.goal.tolist(), m.plan.cost) for m in second
     ]
 
 

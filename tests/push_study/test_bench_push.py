@@ -16,10 +16,10 @@ from push_study.experiments import bench_push, box_delivery
 from push_study.study import StudyOptions
 
 
-def installed(of=room):
-    """Whether the environment is there that a module needs, ``room`` of a study's package."""
+def installed(found=room.python):
+    """Whether what a study needs is there: ``found`` is its function that returns the path."""
     try:
-        of.python()
+        found()
     except SettingsError:
         return False
     return True

@@ -13,7 +13,8 @@ from push_model.occupancy import rasterise
 from push_model.settings import SettingsError
 from push_model.specs import BoxSpec, EnvironmentSpec
 from push_scenario.bodies import load_object, load_robot
-from push_study.rivals.dubins_push import METHOD, DubinsPusher, DubinsSettings, dubins
+from push_study.rivals.dubins_plans import Push, dubins, dubins_plans
+from push_study.rivals.dubins_push import METHOD, DubinsPusher, DubinsSettings
 from push_study.rivals.stable_grips import grips
 from push_study.team_run import OBJECT, made_scenario, run_team
 from push_study.uncertainty import uncertainty
@@ -71,6 +72,62 @@ def test_paths_join_their_ends_with_bends_that_are_allowed():
         assert (turns <= (0.01 + 1e-6) / radius).all()
 
 
+SQUARE = [Push(np.array([0.0, 0.0, -0.5 * math.pi * k]), 0.5) for k in range(4)]
+"""The path is that of the object; it can be pushed in four directions."""
+
+
+def inside(path, index):
+    return bool((np.abs(path[:, :2]) <= 1.0).all())
+
+
+def large(path, index):
+    return bool((np.abs(path[:, :2]) <= 2.0).all())
+
+
+@pytest.mark.parametrize("strict", [False, True])
+def test_plans_are_clear_and_end_at_the_goal_and_the_first_is_the_shortest(strict):
+    """100 random problems in a square."""
+    random, direct, relocated = np.random.default_rng(4), 0, 0
+    for _ in range(100):
+        item, goal = random.uniform([-0.9, -0.9, -3.0], [0.9, 0.9, 3.0], (2, 3))
+        plans = dubins_plans(item, [goal], SQUARE, inside, strict)
+        assert [p.length for p in plans] == sorted(p.length for p in plans)
+        for plan in plans:
+            push, path = SQUARE[plan.push], plan.path
+            assert inside(path, plan.push)
+            steps = float(np.hypot(*np.diff(path[:, :2], axis=0).T).sum())
+            if plan.relocates:
+                relocated += 1
+                there = se2.compose(path[-1], push.grasp)
+                rest = plan.length - steps
+                ends = [(se2.compose(there, s), se2.compose(goal, s)) for s in TURNS]
+                assert any(abs(dubins(*e, 0.5)[1] - rest) < 1e-6 for e in ends)
+            else:
+                direct += 1
+                assert plan.length == pytest.approx(steps, rel=1e-3)
+                end = se2.between(goal, se2.compose(path[-1], push.grasp))
+                assert np.hypot(*end[:2]) < 1e-6 and abs(se2.wrap(end[2])) < 1e-6
+    assert direct > 30 and relocated > 30
+
+
+TURNS = [se2.inverse(push.grasp) for push in SQUARE]
+
+
+def test_strictly_only_objects_whose_path_bends_all_the_way_are_relocated():
+    """A wall across the straight way blocks the path, which is a straight part."""
+    item, goal = np.array([-0.8, 0.0, 0.0]), np.array([0.9, 0.3, 0.0])
+
+    def beside(path, index):
+        crosses = (np.abs(path[:, 0]) < 0.1) & (np.abs(path[:, 1]) < 0.5)
+        return inside(path, index) and not crosses.any()
+
+    assert not dubins_plans(item, [goal], SQUARE[:1], beside, strict=True)
+    assert dubins_plans(item, [goal], SQUARE, beside)[0].relocates
+    item, near = np.array([1.5, 0.0, 0.0]), np.array([1.6, 0.9, math.pi])
+    assert not large(dubins(item, near, 0.5)[0], 0)  # it leaves the room
+    assert any(p.relocates for p in dubins_plans(item, [near], SQUARE, large, strict=True))
+
+
 @pytest.mark.parametrize("seed", mostly_long(range(40), 4))
 def test_goals_in_an_open_room_are_reached(seed):
     """Any heading: where no path fits into the room, after a straight push."""
@@ -85,17 +142,17 @@ def test_goals_in_an_open_room_are_reached(seed):
 
 @pytest.mark.long
 def test_paths_keep_clear_of_the_map_and_the_bends_are_stable():
-    """Of 10 random goals beside a wall with an end."""
+    """Of 15 random goals beside a wall with an end."""
     room = EnvironmentSpec((3.0, 2.4), boxes=(BoxSpec((0.0, -0.5), (0.1, 1.4)),))
     method, random, found = DubinsPusher(arena(room)), np.random.default_rng(3), 0
     field = method._side.field
-    for _ in range(10):
+    for _ in range(15):
         goal = random.uniform([0.4, -0.8, -1.5], [1.2, 0.8, 1.5])
         method.begin(Task((goal,)), BELIEF)
         sides = grips(0.85, BELIEF, ROBOT, OBJECT)
         item = BOX.mass_pose(START)
-        plans = [*method._direct(item, sides, ROBOT), *method._relocating(item, sides, ROBOT)]
-        for _, grip, path in plans:
+        for plan in method._plans(item, sides, ROBOT):
+            grip, path = sides[plan.push], plan.path
             found += 1
             items = np.array([se2.compose(p, grip.grasp) for p in path])
             assert field.clearances(BOX.geometry.outline, items).min() >= 0.01
@@ -131,7 +188,8 @@ def test_where_no_path_is_clear_the_object_is_first_pushed_straight_on():
     method = DubinsPusher(arena())
     method.begin(Task((np.array(goal),)), BELIEF)
     sides = grips(0.85, BELIEF, ROBOT, OBJECT)
-    assert not list(method._direct(BOX.mass_pose(START), sides, ROBOT))
+    plans = method._plans(BOX.mass_pose(START), sides, ROBOT)
+    assert plans and all(plan.relocates for plan in plans)
     status, item = run(goal)
     assert status.code == JobError.NONE and status.pushes == 2
     assert np.hypot(*(item[:2] - goal[:2])) <= 0.02

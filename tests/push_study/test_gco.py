@@ -205,7 +205,7 @@ def test_a_script_that_hangs_is_ended(tmp_path):
     assert process.poll() is not None
 
 
-@pytest.mark.skipif(not installed(room), reason="the environment of GCo is not installed")
+@pytest.mark.skipif(not installed(room.python), reason="the environment of GCo is not installed")
 def test_the_room_tells_time_ways_and_touches():
     """A robot is dragged past the object into the obstacle; the object's heading is as it was told,
     a quarter turn more than GCo counts it."""
@@ -228,7 +228,7 @@ def test_the_room_tells_time_ways_and_touches():
 
 
 @pytest.mark.long
-@pytest.mark.skipif(not installed(room), reason="the environment of GCo is not installed")
+@pytest.mark.skipif(not installed(room.python), reason="the environment of GCo is not installed")
 @pytest.mark.parametrize("name", ROOMS)
 def test_both_reach_goals_and_equal_seeds_give_equal_rows(name):
     for method in gco.METHODS:

@@ -18,7 +18,8 @@ from push_scenario.scenario import Scenario, load_scenario
 
 SCALE = 0.6
 """Our lengths over theirs."""
-_SIZE = (4.0, 5.4)  # [m] bounds of the rear axle
+BOUNDS = (4.0, 5.4)
+"""[m] of the car's rear axle, and of boxes."""
 _NOSE = 0.3  # [m] of the car, ahead of its rear axle
 _NOISE = 0.05  # [m] of every position
 _APART, _DRAWN = 0.7, (4.0, 5.2)  # [m] between all positions of the generator, and its bounds
@@ -39,7 +40,9 @@ class Scene:
 
 
 SCENES: dict[str, Scene] = {
-    "relopush-2": Scene(((2.05, 3.65), (1.0, 3.65)), ((0.0, 0.0), (3.0, 3.65)), (2.0, 2.5, 1.5708)),
+    "relopush-2": Scene(
+        ((2.05, 3.65), (1.0, 3.65)), ((0.0, 0.05), (3.0, 3.65)), (2.0, 2.5, 1.5708)
+    ),
     "relopush-3": Scene(
         ((1.0, 1.5), (1.4, 2.3), (1.2, 3.1)),
         ((3.8, 2.3), (3.4, 3.1), (3.6, 1.5)),
@@ -149,17 +152,22 @@ def scenario_of(name: str, seed: int) -> Scenario:
     ------
     SettingsError: see ``scene``; or a box that stands in a wall, or in another one.
     """
-    found, example = scene(name, seed), load_scenario("rearrange")
+    return scaled(scene(name, seed), f"{name}-{seed}")
+
+
+def scaled(found: Scene, name: str) -> Scenario:
+    """The scenario of a scene: an e-puck and 9 cm boxes, and all lengths times ``SCALE``."""
+    example = load_scenario("rearrange")
     robot, item = example.robot()[1], example.object()[1]
 
     def pose(x: float, y: float, heading: float = 0.0) -> np.ndarray:
-        place = SCALE * (np.array([x, y]) - 0.5 * np.array(_SIZE))
+        place = SCALE * (np.array([x, y]) - 0.5 * np.array(BOUNDS))
         return np.append(place, heading)
 
-    wide, high = (SCALE * (length + 2.0 * _NOSE) for length in _SIZE)
+    wide, high = (SCALE * (length + 2.0 * _NOSE) for length in BOUNDS)
     names = [f"box{i + 1}" for i in range(len(found.boxes))]
     made = Scenario(
-        f"{name}-{seed}",
+        name,
         EnvironmentSpec((wide, high)),
         {example.robot()[0]: (robot, pose(*found.robot))},
         {n: (item, pose(*p)) for n, p in zip(names, found.boxes, strict=True)},

@@ -1,0 +1,154 @@
+"""Planning for several boxes: the program of ReloPush, and our search, for the same instances.
+
+The instances are those that the authors published, 100 for each number of boxes; the trial with
+seed k is the instance k. ReloPush plans for its car and its 15 cm boxes. Ours plans for an e-puck
+and 9 cm boxes, with all lengths scaled by 0.6, as in the study ``rearrange``. Nothing is executed.
+
+With one box (``1-…``), the program of ReloPush is compared with our reconstruction, the method
+``dubins-push``: see ``dubins_plans``.
+"""
+
+import time
+from collections.abc import Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from push_model.distance_field import DistanceField
+from push_planner.push_plan import PlanningFailed
+from push_planner.rearrangement import Move, Rearrangement, RearrangementSettings
+from push_planner.settings import PlannerSettings
+from push_scenario.scenario import Scenario
+from push_study import by_scenario
+from push_study.by_scenario import Episode, episodes, finished, scenarios
+from push_study.pool import Row
+from push_study.relopush.authors import ALONE, FILES, instance, parsed, plan, plan_alone
+from push_study.relopush.authors import program as ready
+from push_study.relopush.scenes import SCALE, scaled, scenario_of
+from push_study.statistics import mean_interval
+from push_study.study import StudyOptions
+
+__all__ = ["MEASURES", "OPTIONS", "SCENARIOS", "conclude", "ready", "statistics", "tasks", "trial"]
+
+METHODS = ("relopush", "rearrange")
+SCENARIOS = (*scenarios(FILES, METHODS), f"{ALONE}-relopush", f"{ALONE}-dubins")
+OPTIONS: dict[str, str] = {}
+MEASURES = ("cpu_s", "pushes", "relocations", "way_m")
+"""cpu_s: [s] of the search. pushes: in the plan. relocations: pushes, of ours moves, that end
+somewhere else than at a goal. way_m: [m] of all boxes, in lengths of the authors."""
+_OF_SUCCESSES = ("pushes", "relocations", "way_m")
+
+
+def tasks(options: StudyOptions) -> list[Episode]:
+    """As many instances. Raises SettingsError for another scenario, or an instance that is none."""
+    made = episodes(options, SCENARIOS)
+    for task in made:
+        instance(task.scenario.split("-")[0], task.seed)
+    return made
+
+
+def trial(task: Episode) -> Row:
+    """Plan for one instance."""
+    boxes, method = task.scenario.split("-")
+    row = {"relopush": _authors, "rearrange": _ours, "dubins": _rebuilt}[method]
+    return {"scenario": task.scenario, "seed": task.seed, **row(instance(boxes, task.seed))}
+
+
+def _authors(line: str) -> Row:
+    told = plan(line)
+    kinds = [part.kind for part in told.parts]
+    return {
+        "success": bool(told.parts),
+        "reason": "" if told.parts else "ReloPush finds no plan",
+        "cpu_s": told.cpu,
+        "pushes": kinds.count("app"),
+        "relocations": kinds.count("pre") + kinds.count("temp"),
+        "way_m": sum(part.way for part in told.parts),
+    }
+
+
+def _rebuilt(line: str) -> Row:
+    began = time.thread_time()
+    plans = plan_alone(line)
+    return {
+        "success": bool(plans),
+        "reason": "" if plans else "no Dubins path is clear, also after a straight push",
+        "cpu_s": time.thread_time() - began,
+        "pushes": 1 + plans[0].relocates if plans else 0,
+        "relocations": int(plans[0].relocates) if plans else 0,
+        "way_m": plans[0].length if plans else 0.0,
+    }
+
+
+def _ours(line: str) -> Row:
+    scenario = scaled(parsed(line), "instance")
+    field = DistanceField(scenario.grid)
+    _ready()
+    moves: list[Move] = []
+    began, reason = time.thread_time(), ""
+    try:
+        moves = _searched(scenario, field)
+    except PlanningFailed as failure:
+        reason = str(failure)
+    return {
+        "success": not reason,
+        "reason": reason,
+        "cpu_s": time.thread_time() - began,
+        "pushes": sum(len(move.plan.segments) for move in moves),
+        "relocations": sum(move.aside for move in moves),
+        "way_m": sum(_way(move) for move in moves) / SCALE,
+    }
+
+
+def _way(move: Move) -> float:
+    """[m] of the box."""
+    steps = [np.diff(segment.object_poses[:, :2], axis=0) for segment in move.plan.segments]
+    return float(np.hypot(*np.vstack(steps).T).sum())
+
+
+@cache
+def _ready() -> None:
+    """Load the kernels of the planner, once in a process, as its node does when it starts."""
+    scenario = scenario_of("relopush-2", 1)
+    _searched(scenario, DistanceField(scenario.grid))
+
+
+def _searched(scenario: Scenario, field: DistanceField) -> list[Move]:
+    """The moves, searched for as the node ``rearranger`` does."""
+    search = Rearrangement(
+        RearrangementSettings(),
+        PlannerSettings(),
+        field,
+        scenario.robot()[1],
+        {name: item for name, (item, _) in scenario.objects.items()},
+    )
+    poses = {name: start for name, (_, start) in scenario.objects.items()}
+    work = search.plan(poses, scenario.arrangement, scenario.robots[scenario.robot()[0]][1])
+    while True:
+        try:
+            next(work)
+        except StopIteration as end:
+            found: list[Move] = end.value
+            return found
+
+
+def statistics(rows: list[Row]) -> dict[str, Any]:
+    """See ``by_scenario``; pushes, relocations and ways are of the plans that are found. For the
+    instances that both plan, also our way less that of ReloPush: 95 % interval of the mean."""
+    found = by_scenario.statistics(rows, MEASURES, _OF_SUCCESSES)
+    for boxes in (ALONE, *FILES):
+        theirs, ours = (
+            {int(r["seed"]): r for r in finished(rows, f"{boxes}-{method}") if r["success"]}
+            for method in ("relopush", "dubins" if boxes == ALONE else "rearrange")
+        )
+        both = sorted(ours.keys() & theirs.keys())
+        if both:
+            less = [float(ours[k]["way_m"]) - float(theirs[k]["way_m"]) for k in both]
+            found[f"way_less_than_relopush_{boxes}"] = mean_interval(np.array(less))
+    return found
+
+
+def conclude(options: StudyOptions, tasks: Sequence[Any], rows: list[Row]) -> None:
+    """A line for each scenario and measure."""
+    by_scenario.report(options, rows, "planned", MEASURES, _OF_SUCCESSES)
