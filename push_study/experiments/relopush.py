@@ -23,7 +23,7 @@ from push_scenario.scenario import Scenario
 from push_study import by_scenario
 from push_study.by_scenario import Episode, episodes, finished, scenarios
 from push_study.pool import Row
-from push_study.relopush.authors import ALONE, FILES, instance, parsed, plan, plan_alone
+from push_study.relopush.authors import ALONE, FILES, MODES, instance, parsed, plan, plan_alone
 from push_study.relopush.authors import program as ready
 from push_study.relopush.scenes import SCALE, scaled, scenario_of
 from push_study.statistics import mean_interval
@@ -33,6 +33,8 @@ __all__ = ["MEASURES", "OPTIONS", "SCENARIOS", "conclude", "ready", "statistics"
 
 METHODS = ("relopush", "rearrange")
 SCENARIOS = (*scenarios(FILES, METHODS), f"{ALONE}-relopush", f"{ALONE}-dubins")
+BASELINES = scenarios(FILES, ("dubinsonly", "mponly"))
+"""Scenarios that can also be named: those of the authors, see ``MODES``; without ``way_m``."""
 OPTIONS: dict[str, str] = {}
 MEASURES = ("cpu_s", "pushes", "relocations", "way_m")
 """cpu_s: [s] of the search. pushes: in the plan. relocations: pushes, of ours moves, that end
@@ -42,7 +44,7 @@ _OF_SUCCESSES = ("pushes", "relocations", "way_m")
 
 def tasks(options: StudyOptions) -> list[Episode]:
     """As many instances. Raises SettingsError for another scenario, or an instance that is none."""
-    made = episodes(options, SCENARIOS)
+    made = episodes(options, (*SCENARIOS, *BASELINES))
     for task in made:
         instance(task.scenario.split("-")[0], task.seed)
     return made
@@ -51,20 +53,25 @@ def tasks(options: StudyOptions) -> list[Episode]:
 def trial(task: Episode) -> Row:
     """Plan for one instance."""
     boxes, method = task.scenario.split("-")
-    row = {"relopush": _authors, "rearrange": _ours, "dubins": _rebuilt}[method]
-    return {"scenario": task.scenario, "seed": task.seed, **row(instance(boxes, task.seed))}
+    line = instance(boxes, task.seed)
+    if method in MODES:
+        row = _authors(line, method)
+    else:
+        row = _ours(line) if method == "rearrange" else _rebuilt(line)
+    return {"scenario": task.scenario, "seed": task.seed, **row}
 
 
-def _authors(line: str) -> Row:
-    told = plan(line)
+def _authors(line: str, method: str) -> Row:
+    told = plan(line, MODES[method])
     kinds = [part.kind for part in told.parts]
+    way = {"way_m": sum(part.way for part in told.parts)} if method == "relopush" else {}
     return {
         "success": bool(told.parts),
-        "reason": "" if told.parts else "ReloPush finds no plan",
+        "reason": "" if told.parts else f"{method} finds no plan",
         "cpu_s": told.cpu,
         "pushes": kinds.count("app"),
         "relocations": kinds.count("pre") + kinds.count("temp"),
-        "way_m": sum(part.way for part in told.parts),
+        **way,
     }
 
 

@@ -27,11 +27,14 @@ FILES = {
 """Of 100 instances each, by the number of boxes."""
 ALONE = "1"
 """Number of boxes of instances that are made of them."""
+MODES = {"relopush": "proposed", "dubinsonly": "dubins_only", "mponly": "mp_only"}
+"""Of the program, by our names: its method; its baseline without pre-relocations; its baseline
+without the graph, which plans each push by Hybrid A*."""
 RADIUS = 0.29 / math.tan(0.185)
 """[m] of the tightest bend of a push (``path_planning_tools.h``)."""
 _NEARER = 0.14  # [m] by which the car ends nearer to the box than it begins (``params.cpp``)
 _BEFORE = 0.625  # [m] of the car from the box before it begins to push (``params.cpp``)
-_HANGS = 600.0  # [s] of wall time without an answer; it takes about a second at most
+_HANGS = 1800.0  # [s] of wall time without an answer; a baseline takes about a minute at most
 
 
 @dataclass(frozen=True)
@@ -110,8 +113,8 @@ def parsed(line: str) -> Scene:
     )
 
 
-def plan(line: str) -> Told:
-    """Of an instance, by the program of the authors.
+def plan(line: str, mode: str = "proposed") -> Told:
+    """Of an instance, by the program of the authors, in one of its ``MODES``.
 
     Raises
     ------
@@ -119,7 +122,12 @@ def plan(line: str) -> Told:
     """
     try:
         done = subprocess.run(
-            [str(program())], input=line, capture_output=True, text=True, timeout=_HANGS, check=True
+            [str(program()), mode],
+            input=line,
+            capture_output=True,
+            text=True,
+            timeout=_HANGS,
+            check=True,
         )
     except subprocess.CalledProcessError as error:
         raise RuntimeError(f"the program of ReloPush ended with {error.returncode}") from None

@@ -5,9 +5,10 @@
 
 #include <ctime>
 
-int main() {
-  params::use_better_path = true;  // with pre-relocations, as in its mode "proposed"
-  params::use_mp_only = false;
+int main(int argc, char** argv) {
+  const std::string mode = argc > 1 ? argv[1] : "proposed";
+  params::use_better_path = mode == "proposed";
+  params::use_mp_only = mode == "mp_only";
 
   ros::NodeHandle node;
   nh_ptr = &node;

@@ -134,9 +134,12 @@ def test_the_reconstruction_plans_for_one_box_as_the_program_does(count):
 
 @needs_program
 def test_trials_of_all_methods(tmp_path):
-    rows = [relopush.trial(Episode(name, 4)) for name in relopush.SCENARIOS]
+    names = (*relopush.SCENARIOS, "2-dubinsonly", "2-mponly")
+    rows = [relopush.trial(Episode(name, 4)) for name in names]
     assert all(row["success"] or "finds no plan" in row["reason"] for row in rows)
     found = relopush.statistics(rows)
     assert found["wilson_1-dubins"][1] == 1.0 and "way_less_than_relopush_1" in found
     mine = next(row for row in rows if row["scenario"] == "3-rearrange")
+    cpu = {row["scenario"]: row["cpu_s"] for row in rows}
+    assert cpu["2-dubinsonly"] > 3.0 * cpu["2-relopush"]  # 25 times, as measured
     assert mine["pushes"] >= 3 and mine["way_m"] > 5.0 and mine["cpu_s"] > 0.0
