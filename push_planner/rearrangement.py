@@ -87,7 +87,8 @@ class Move:
     """One object to one pose.
 
     start, goal: ``(3,)`` [m, m, rad] of the object's geometric frame. plan: the pushes that were
-    found; others may be made. aside: whether the pose is not the object's goal.
+    found; when the move begins, it is planned anew. aside: whether the pose is not the object's
+    goal.
     """
 
     object: str

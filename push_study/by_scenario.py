@@ -60,7 +60,7 @@ def finished(rows: list[Row], name: str) -> list[Row]:
 
 def _values(rows: list[Row], measure: str, of_successes: Collection[str]) -> Array:
     rows = [r for r in rows if r["success"] or measure not in of_successes]
-    return np.array([float(r[measure]) for r in rows if measure in r])
+    return np.array([float(r[measure]) for r in rows])
 
 
 def report(

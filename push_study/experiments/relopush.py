@@ -4,12 +4,14 @@ The instances are those that the authors published, 100 for each number of boxes
 seed k is the instance k. ReloPush plans for its car and its 15 cm boxes. Ours plans for an e-puck
 and 9 cm boxes, with all lengths scaled by 0.6, as in the study ``rearrange``. Nothing is executed.
 
-With one box (``1-…``), the program of ReloPush is compared with our reconstruction, the method
-``dubins-push``: see ``dubins_plans``.
+With one box (``1-…``), the program of ReloPush is compared with our reconstruction
+(``dubins_plans``): ``1-dubins`` with the rules of the authors, ``1-contest`` without those that the
+method ``dubins-push`` leaves out in the contests of the leaderboard.
 """
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -32,18 +34,19 @@ from push_study.study import StudyOptions
 __all__ = ["MEASURES", "OPTIONS", "SCENARIOS", "conclude", "ready", "statistics", "tasks", "trial"]
 
 METHODS = ("relopush", "rearrange")
-SCENARIOS = (*scenarios(FILES, METHODS), f"{ALONE}-relopush", f"{ALONE}-dubins")
+_ALONE = scenarios((ALONE,), ("relopush", "dubins", "contest"))
+SCENARIOS = (*scenarios(FILES, METHODS), *_ALONE)
 BASELINES = scenarios(FILES, ("dubinsonly", "mponly"))
 """Scenarios that can also be named: those of the authors, see ``MODES``; without ``way_m``."""
 OPTIONS: dict[str, str] = {}
-MEASURES = ("cpu_s", "pushes", "relocations", "way_m")
-"""cpu_s: [s] of the search. pushes: in the plan. relocations: pushes, of ours moves, that end
-somewhere else than at a goal. way_m: [m] of all boxes, in lengths of the authors."""
-_OF_SUCCESSES = ("pushes", "relocations", "way_m")
+MEASURES = ("cpu_s", "pushes", "aside", "way_m")
+"""cpu_s: [s] of the search. pushes: times that the robot drives to a box. aside: times that a box
+is moved out of the way of another one. way_m: [m] of all boxes, in lengths of the authors."""
+_OF_SUCCESSES = ("pushes", "aside", "way_m")
 
 
 def tasks(options: StudyOptions) -> list[Episode]:
-    """As many instances. Raises SettingsError for another scenario, or an instance that is none."""
+    """A task for each trial. Raises SettingsError for an unknown scenario or instance."""
     made = episodes(options, (*SCENARIOS, *BASELINES))
     for task in made:
         instance(task.scenario.split("-")[0], task.seed)
@@ -57,7 +60,7 @@ def trial(task: Episode) -> Row:
     if method in MODES:
         row = _authors(line, method)
     else:
-        row = _ours(line) if method == "rearrange" else _rebuilt(line)
+        row = _ours(line) if method == "rearrange" else _rebuilt(line, method == "dubins")
     return {"scenario": task.scenario, "seed": task.seed, **row}
 
 
@@ -70,20 +73,20 @@ def _authors(line: str, method: str) -> Row:
         "reason": "" if told.parts else f"{method} finds no plan",
         "cpu_s": told.cpu,
         "pushes": kinds.count("app"),
-        "relocations": kinds.count("pre") + kinds.count("temp"),
+        "aside": kinds.count("temp"),
         **way,
     }
 
 
-def _rebuilt(line: str) -> Row:
+def _rebuilt(line: str, strict: bool) -> Row:
     began = time.thread_time()
-    plans = plan_alone(line)
+    plans = plan_alone(line, strict)
     return {
         "success": bool(plans),
         "reason": "" if plans else "no Dubins path is clear, also after a straight push",
         "cpu_s": time.thread_time() - began,
         "pushes": 1 + plans[0].relocates if plans else 0,
-        "relocations": int(plans[0].relocates) if plans else 0,
+        "aside": 0,
         "way_m": plans[0].length if plans else 0.0,
     }
 
@@ -103,7 +106,7 @@ def _ours(line: str) -> Row:
         "reason": reason,
         "cpu_s": time.thread_time() - began,
         "pushes": sum(len(move.plan.segments) for move in moves),
-        "relocations": sum(move.aside for move in moves),
+        "aside": sum(move.aside for move in moves),
         "way_m": sum(_way(move) for move in moves) / SCALE,
     }
 
@@ -141,21 +144,34 @@ def _searched(scenario: Scenario, field: DistanceField) -> list[Move]:
 
 
 def statistics(rows: list[Row]) -> dict[str, Any]:
-    """See ``by_scenario``; pushes, relocations and ways are of the plans that are found. For the
-    instances that both plan, also our way less that of ReloPush: 95 % interval of the mean."""
-    found = by_scenario.statistics(rows, MEASURES, _OF_SUCCESSES)
-    for boxes in (ALONE, *FILES):
+    """See ``by_scenario``; pushes, boxes moved aside and ways are of the plans that are found. For
+    the instances that both plan, also our way less that of ReloPush: 95 % interval of the mean, and
+    the number of instances in which they are equal to a millimetre."""
+    found: dict[str, Any] = {}
+    for measures, names in _with_measures(str(r["scenario"]) for r in rows):
+        mine = [r for r in rows if r["scenario"] in names]
+        found |= by_scenario.statistics(mine, measures, _OF_SUCCESSES)
+    for name in (*scenarios(FILES, ("rearrange",)), *_ALONE[1:]):
         theirs, ours = (
-            {int(r["seed"]): r for r in finished(rows, f"{boxes}-{method}") if r["success"]}
-            for method in ("relopush", "dubins" if boxes == ALONE else "rearrange")
+            {int(r["seed"]): float(r["way_m"]) for r in finished(rows, of) if r["success"]}
+            for of in (f"{name.split('-')[0]}-relopush", name)
         )
-        both = sorted(ours.keys() & theirs.keys())
-        if both:
-            less = [float(ours[k]["way_m"]) - float(theirs[k]["way_m"]) for k in both]
-            found[f"way_less_than_relopush_{boxes}"] = mean_interval(np.array(less))
+        less = np.array([ours[k] - theirs[k] for k in sorted(ours.keys() & theirs.keys())])
+        if len(less):
+            found[f"way_less_than_relopush_{name}"] = mean_interval(less)
+            found[f"way_equal_to_relopush_{name}"] = int((np.abs(less) <= 1e-3).sum())
     return found
+
+
+def _with_measures(names: Iterable[str]) -> list[tuple[tuple[str, ...], list[str]]]:
+    """Scenarios that have all measures, and those that have no way."""
+    names = list(dict.fromkeys(names))
+    alike = [n for n in names if n not in BASELINES], [n for n in names if n in BASELINES]
+    return list(zip((MEASURES, MEASURES[:-1]), alike, strict=True))
 
 
 def conclude(options: StudyOptions, tasks: Sequence[Any], rows: list[Row]) -> None:
     """A line for each scenario and measure."""
-    by_scenario.report(options, rows, "planned", MEASURES, _OF_SUCCESSES)
+    for measures, names in _with_measures(options.scenarios):
+        mine = replace(options, scenarios=tuple(names))
+        by_scenario.report(mine, rows, "planned", measures, _OF_SUCCESSES)

@@ -28,12 +28,14 @@ FILES = {
 ALONE = "1"
 """Number of boxes of instances that are made of them."""
 MODES = {"relopush": "proposed", "dubinsonly": "dubins_only", "mponly": "mp_only"}
-"""Of the program, by our names: its method; its baseline without pre-relocations; its baseline
-without the graph, which plans each push by Hybrid A*."""
+"""Of the program, by our names: its method, and two baselines of its authors. ``dubins_only`` has
+no pre-relocations: if a Dubins path is not free, it plans this push by Hybrid A*. ``mp_only`` has
+no graph, and plans all pushes by Hybrid A*."""
 RADIUS = 0.29 / math.tan(0.185)
 """[m] of the tightest bend of a push (``path_planning_tools.h``)."""
 _NEARER = 0.14  # [m] by which the car ends nearer to the box than it begins (``params.cpp``)
 _BEFORE = 0.625  # [m] of the car from the box before it begins to push (``params.cpp``)
+_BEFORE_RELOCATION = 2.0 * _BEFORE  # before a pre-relocation: ``find_pre_push`` is called twice
 _HANGS = 1800.0  # [s] of wall time without an answer; a baseline takes about a minute at most
 
 
@@ -42,9 +44,10 @@ class Part:
     """A part of a plan, in the order of execution.
 
     kind: ``app``, a drive to a box; ``pre``, a straight push of a box to a place from which its
-    goal can be reached; ``temp``, one of a box that stands in the way; ``final``, a push along a
-    Dubins path to a goal, or to the place of another box on the way to it. start, end: poses
-    ``(3,)`` [m, m, rad]; if ``final``, of the box with the heading of the car, else of the car.
+    goal can be reached; ``temp``, one of a box over whose place another one is pushed; ``final``, a
+    push along a Dubins path to a goal, or to the place of such a box. start, end: poses ``(3,)``
+    [m, m, rad]; if ``final``, of the box with the heading of the car; if ``pre`` or ``temp``, of
+    the car. Those of ``app`` are not always those of the drive.
     """
 
     kind: str
@@ -138,9 +141,16 @@ def plan(line: str, mode: str = "proposed") -> Told:
     return Told(parts if told["found"] else (), float(told["cpu_s"]))
 
 
-def plan_alone(line: str) -> list[DubinsPlan]:
+def plan_alone(line: str, strict: bool = True) -> list[DubinsPlan]:
     """Of an instance with one box, by our reconstruction with the bend, the room and the rules of
-    the authors; best first. A box may arrive with any of its sides in front."""
+    the authors, best first. A box may arrive with any of its sides in front.
+
+    Two details of the program decide which plan is its best: before a pre-relocation, the car must
+    stand ``_BEFORE_RELOCATION`` from the box inside of the bounds; and a pre-relocation counts with
+    the way of the car, which is ``_NEARER`` longer than that of the box. Which of two equally near
+    places it takes is a matter of its rounding. Without ``strict``,
+    these details are left out too, as in the contests.
+    """
     (box,), (goal,), _ = astuple(parsed(line))
     turns = [0.5 * math.pi * k for k in range(4)]
     pushes = [Push(np.array([0.0, 0.0, -turn]), RADIUS) for turn in turns]
@@ -148,12 +158,28 @@ def plan_alone(line: str) -> list[DubinsPlan]:
 
     def clear(path: Array, index: int) -> bool:
         """Box and car, before it begins to push, are inside of the bounds."""
-        x, y, heading = path[0]
-        before = [[x - _BEFORE * math.cos(heading), y - _BEFORE * math.sin(heading)]]
-        places = np.vstack([path[:, :2], before])
-        return bool((places >= 0.0).all() and (places < BOUNDS).all())
+        return _inside(path) and _inside(_behind(path[0], _BEFORE))
 
-    return dubins_plans(np.array([*box, 0.0]), goals, pushes, clear, strict=True)
+    found = dubins_plans(np.array([*box, 0.0]), goals, pushes, clear, strict)
+    if not strict:
+        return found
+    kept = [
+        plan
+        for plan in found
+        if not plan.relocates or _inside(_behind(plan.path[0], _BEFORE_RELOCATION))
+    ]
+    return sorted(kept, key=lambda plan: plan.length + _NEARER * plan.relocates)
+
+
+def _behind(pose: Array, away: float) -> Array:
+    """Pose ``(1, 3)`` of a robot some way [m] behind its pose ``(3,)``."""
+    x, y, heading = pose
+    return np.array([[x - away * math.cos(heading), y - away * math.sin(heading), heading]])
+
+
+def _inside(poses: Array) -> bool:
+    """Whether poses ``(n, 3)`` are inside of the bounds."""
+    return bool((poses[:, :2] >= 0.0).all() and (poses[:, :2] < BOUNDS).all())
 
 
 def _alone(random: np.random.Generator) -> str:

@@ -6,7 +6,11 @@
 #include <ctime>
 
 int main(int argc, char** argv) {
-  const std::string mode = argc > 1 ? argv[1] : "proposed";
+  const std::string mode = argc > 1 ? argv[1] : "";
+  if (mode != "proposed" && mode != "dubins_only" && mode != "mp_only") {
+    std::cerr << "usage: plan proposed|dubins_only|mp_only < INSTANCE" << std::endl;
+    return 2;
+  }
   params::use_better_path = mode == "proposed";
   params::use_mp_only = mode == "mp_only";
 
@@ -42,7 +46,6 @@ int main(int argc, char** argv) {
     if (part.type == moveType::final && relocated) from = State(place.x, place.y, from.yaw);
     if (part.type != moveType::app) relocated = part.type == moveType::pre;
     if (part.type == moveType::pre) {
-      from = part.path.front();
       const float way = std::hypot(to.x - from.x, to.y - from.y) + params::pre_relo_pre_push_offset;
       place = find_post_push(from, params::pre_push_dist + way);
     }

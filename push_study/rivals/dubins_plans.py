@@ -6,12 +6,12 @@ a goal. If this path is not clear, the object is first pushed straight ahead fro
 to the nearest place from which the path is clear (pre-relocation). Of all plans, the one with the
 shortest pushes is the best.
 
-A Dubins path between poses that are near each other bends all the way or makes a loop. Beyond a
-distance that depends on their headings (``_far``), it is a bend, a straight part and a bend. The
-code of the authors (``strict``) relocates an object only if its path is of the first kind, only to
-where it is of the second kind, and only by the side that has the nearest such place. Other objects
-that are in the way are moved there. Obstacles cannot be moved, so the method ``dubins-push`` leaves
-out these conditions.
+Between poses that are farther from each other than a distance that depends on their headings
+(``_far``), the path is a bend, a straight part and a bend. The code of the authors (``strict``)
+relocates an object only if it is not so far from the goal, only to where it is, and only by the
+side that has the nearest such place. The method ``dubins-push`` leaves out these conditions: it
+also relocates an object whose path is blocked by obstacles, which the rooms of the authors do not
+have.
 """
 
 import math

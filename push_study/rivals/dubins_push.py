@@ -8,7 +8,7 @@ Filled in, or other than in ReloPush:
 - ReloPush plans for several objects, and moves others out of the way; here there is one, and
   obstacles cannot be moved. Therefore an object is also relocated if obstacles block its path.
 - The bend is the tightest that an ellipsoidal limit surface allows with ``friction_trust`` of the
-  believed friction. ReloPush has one turning radius for its car and its boxes.
+  believed friction. ReloPush has one fixed radius for all pushes.
 - The path is that of the robot's axle. In ReloPush, it is that of the object, and the car follows
   it.
 - There, a controller of a car follows the path; here the robot steers by how far it is from the

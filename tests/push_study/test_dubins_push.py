@@ -128,6 +128,45 @@ def test_strictly_only_objects_whose_path_bends_all_the_way_are_relocated():
     assert any(p.relocates for p in dubins_plans(item, [near], SQUARE, large, strict=True))
 
 
+def far(start, goal):
+    """Lim et al., Circling Back: Dubins set classification revisited, for a radius of 0.5 m."""
+    way = goal[:2] - start[:2]
+    a, b = np.array([start[2], goal[2]]) - math.atan2(way[1], way[0])
+    least = abs(math.sin(a)) + abs(math.sin(b)) + math.sqrt(4 - (math.cos(a) + math.cos(b)) ** 2)
+    return np.hypot(*way) / 0.5 > least
+
+
+def test_strictly_an_object_is_relocated_to_the_nearest_far_place_from_which_the_path_is_clear():
+    """All places of 24 random problems are tried."""
+    random, relocated = np.random.default_rng(6), 0
+    for _ in range(24):
+        item, goal = random.uniform([-1.9, -1.9, -3.0], [1.9, 1.9, 3.0], (2, 3))
+        expected = []
+        for turn in TURNS:
+            ends = se2.compose(item, turn), se2.compose(goal, turn)
+            path, length = dubins(*ends, 0.5)
+            if large(path, 0):
+                expected.append(length)
+                continue
+            places = []
+            for direction in [] if far(*ends) else TURNS:
+                for steps in range(1, 51):
+                    ahead = se2.compose(direction, np.array([0.1 * steps, 0.0, 0.0]))
+                    there = se2.compose(item, se2.compose(ahead, se2.inverse(direction)))
+                    if not large(there[None], 0):
+                        break
+                    start = se2.compose(there, turn)
+                    path, length = dubins(start, ends[1], 0.5)
+                    if far(start, ends[1]) and large(path, 0):
+                        places.append((steps, 0.1 * steps + length))
+            nearest = [length for steps, length in places if steps == min(places)[0]]
+            expected += nearest[:1]
+            relocated += bool(nearest)
+        plans = dubins_plans(item, [goal], SQUARE, large, strict=True)
+        assert [p.length for p in plans] == pytest.approx(sorted(expected))
+    assert relocated >= 5
+
+
 @pytest.mark.parametrize("seed", mostly_long(range(40), 4))
 def test_goals_in_an_open_room_are_reached(seed):
     """Any heading: where no path fits into the room, after a straight push."""
