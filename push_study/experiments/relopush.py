@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from push_model.distance_field import DistanceField
+from push_model.settings import SettingsError
 from push_planner.push_plan import PlanningFailed
 from push_planner.rearrangement import Move, Rearrangement, RearrangementSettings
 from push_planner.settings import PlannerSettings
@@ -25,7 +26,16 @@ from push_scenario.scenario import Scenario
 from push_study import by_scenario
 from push_study.by_scenario import Episode, episodes, finished, scenarios
 from push_study.pool import Row
-from push_study.relopush.authors import ALONE, FILES, MODES, instance, parsed, plan, plan_alone
+from push_study.relopush.authors import (
+    ALONE,
+    COUNT,
+    FILES,
+    MODES,
+    instance,
+    parsed,
+    plan,
+    plan_alone,
+)
 from push_study.relopush.authors import program as ready
 from push_study.relopush.scenes import SCALE, scaled, scenario_of
 from push_study.statistics import mean_interval
@@ -49,7 +59,11 @@ def tasks(options: StudyOptions) -> list[Episode]:
     """A task for each trial. Raises SettingsError for an unknown scenario or instance."""
     made = episodes(options, (*SCENARIOS, *BASELINES))
     for task in made:
-        instance(task.scenario.split("-")[0], task.seed)
+        if task.scenario not in _ALONE and not 0 <= task.seed < COUNT:
+            raise SettingsError(
+                f"--seed, --trials: there are {COUNT} instances of {task.scenario}, from 0 to "
+                f"{COUNT - 1}; trial {task.seed} is none of them"
+            )
     return made
 
 

@@ -24,7 +24,8 @@ FILES = {
     "6": "data_6o2",
     "8": "data_8o",
 }
-"""Of 100 instances each, by the number of boxes."""
+"""Of ``COUNT`` instances each, by the number of boxes."""
+COUNT = 100
 ALONE = "1"
 """Number of boxes of instances that are made of them."""
 MODES = {"relopush": "proposed", "dubinsonly": "dubins_only", "mponly": "mp_only"}
@@ -85,21 +86,10 @@ def program() -> Path:
 
 def instance(boxes: str, index: int) -> str:
     """A published one, as the authors write it: of the file for this number of boxes. With one
-    box, it is a random box of a random instance, alone.
-
-    Raises
-    ------
-    SettingsError: there is no such instance.
-    """
+    box, it is a random box of a random instance, alone."""
     if boxes == ALONE:
         return _alone(np.random.default_rng([index, 2409]))
-    lines = _lines(boxes)
-    if not 0 <= index < len(lines):
-        raise SettingsError(
-            f"--seed, --trials: there are {len(lines)} instances with {boxes} boxes, from 0 to "
-            f"{len(lines) - 1}; trial {index} is none of them"
-        )
-    return lines[index]
+    return _lines(boxes)[index]
 
 
 def parsed(line: str) -> Scene:

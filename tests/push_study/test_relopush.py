@@ -11,6 +11,7 @@ from push_planner.push_plan import PlanningFailed
 from push_study.by_scenario import Episode
 from push_study.experiments import relopush
 from push_study.relopush.authors import (
+    COUNT,
     FILES,
     PROGRAM,
     RADIUS,
@@ -81,7 +82,6 @@ def test_ways_of_parts():
     assert half.way == pytest.approx(math.pi * RADIUS)
 
 
-@needs_program
 def test_only_published_instances_are_planned(tmp_path):
     tasks = relopush.tasks(StudyOptions(("8-relopush",), 100, 0, tmp_path))
     assert len(tasks) == 100
@@ -93,6 +93,8 @@ def test_only_published_instances_are_planned(tmp_path):
 def test_instances_are_the_scenes_with_noise():
     for boxes in FILES:
         nominal = SCENES[f"relopush-{boxes}"]
+        with pytest.raises(IndexError):
+            instance(boxes, COUNT)
         for index in range(0, 100, 9):
             scene = parsed(instance(boxes, index))
             drawn = np.array(scene.boxes + scene.goals)
