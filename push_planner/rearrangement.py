@@ -180,6 +180,18 @@ class Rearrangement:
             self._give_up(left)
         return moves
 
+    def solve(
+        self, poses: Mapping[str, Array], goals: Mapping[str, Array], robot: Array | None = None
+    ) -> list[Move]:
+        """The moves of ``plan``, at once."""
+        work = self.plan(poses, goals, robot)
+        while True:
+            try:
+                next(work)
+            except StopIteration as end:
+                moves: list[Move] = end.value
+                return moves
+
     # The search
 
     def _order(

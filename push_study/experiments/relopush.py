@@ -148,13 +148,7 @@ def _searched(scenario: Scenario, field: DistanceField) -> list[Move]:
         {name: item for name, (item, _) in scenario.objects.items()},
     )
     poses = {name: start for name, (_, start) in scenario.objects.items()}
-    work = search.plan(poses, scenario.arrangement, scenario.robots[scenario.robot()[0]][1])
-    while True:
-        try:
-            next(work)
-        except StopIteration as end:
-            found: list[Move] = end.value
-            return found
+    return search.solve(poses, scenario.arrangement, scenario.robots[scenario.robot()[0]][1])
 
 
 def statistics(rows: list[Row]) -> dict[str, Any]:

@@ -18,15 +18,6 @@ from push_study.relopush.scenes import SCENES, scenario_of
 from tests.samples import slice_and_study
 
 
-def planned(search, poses, goals, robot=None):
-    work = search.plan(poses, goals, robot)
-    while True:
-        try:
-            next(work)
-        except StopIteration as end:
-            return end.value
-
-
 def rearrangement(scenario, **values):
     return Rearrangement(
         RearrangementSettings(**values),
@@ -41,7 +32,7 @@ def solve(scenario, **values):
     search = rearrangement(scenario, **values)
     poses = {n: start for n, (_, start) in scenario.objects.items()}
     robot = scenario.robots[scenario.robot()[0]][1]
-    return search, planned(search, poses, scenario.arrangement, robot)
+    return search, search.solve(poses, scenario.arrangement, robot)
 
 
 def check(scenario, moves):
@@ -105,8 +96,8 @@ def test_objects_at_their_goals_stay():
     poses = {n: start for n, (_, start) in scenario.objects.items()}
     near = {n: p + [0.005, 0.0, 0.02] for n, p in poses.items()}
     search = rearrangement(scenario)
-    assert planned(search, poses, near) == [] and search.plans == 0
-    (move,) = planned(search, poses, {**near, "c": poses["c"] + [0.1, 0.0, 0.0]})
+    assert search.solve(poses, near) == [] and search.plans == 0
+    (move,) = search.solve(poses, {**near, "c": poses["c"] + [0.1, 0.0, 0.0]})
     assert move.object == "c"
 
 
@@ -127,7 +118,7 @@ def test_an_object_without_a_goal_is_moved_out_of_the_way():
     settings = RearrangementSettings(), PlannerSettings(), DistanceField(grid)
     search = Rearrangement(*settings, robot, {"a": item, "b": item})
     poses = {"a": np.array([-0.6, 0.0, 0.0]), "b": np.zeros(3)}
-    moves = planned(search, poses, {"a": np.array([0.6, 0.0, 0.0])}, np.array([-1.0, 0.3, 0.0]))
+    moves = search.solve(poses, {"a": np.array([0.6, 0.0, 0.0])}, np.array([-1.0, 0.3, 0.0]))
     assert [(m.object, m.aside) for m in moves] == [("b", True), ("a", False)]
 
 
@@ -154,7 +145,7 @@ def test_it_gives_up_and_says_which_objects_are_left():
     corner = np.array([-1.46, -0.96, 0.0])  # no robot gets behind a box there
     poses = {n: start for n, (_, start) in scenario.objects.items()} | {"a": corner}
     with pytest.raises(PlanningFailed, match="no order of pushes for 'a': in every order there is"):
-        planned(rearrangement(scenario), poses, {"a": np.array([0.0, 0.0, 0.0])})
+        rearrangement(scenario).solve(poses, {"a": np.array([0.0, 0.0, 0.0])})
 
 
 def test_settings_that_make_no_sense_are_refused():
