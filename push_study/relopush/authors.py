@@ -138,8 +138,8 @@ def plan_alone(line: str, strict: bool = True) -> list[DubinsPlan]:
     Two details of the program decide which plan is its best: before a pre-relocation, the car must
     stand ``_BEFORE_RELOCATION`` from the box inside of the bounds; and a pre-relocation counts with
     the way of the car, which is ``_NEARER`` longer than that of the box. Which of two equally near
-    places it takes is a matter of its rounding. Without ``strict``,
-    these details are left out too, as in the contests.
+    places it takes is a matter of its rounding. ``strict``: with the rules of the authors; without
+    them, the plans are those of the contests of the leaderboard.
     """
     (box,), (goal,), _ = astuple(parsed(line))
     turns = [0.5 * math.pi * k for k in range(4)]
